@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The film: sums of samples in float32, read back as means."""
+
+import moderngl
+import numpy as np
+
+from ..scene import Channel
+from ..scene.arrays import Float32Array
+from .device import Device
+
+CHANNEL_COMPONENTS = {
+    Channel.COMBINED: 4,
+    Channel.DEPTH: 1,
+    Channel.NORMAL: 3,
+    Channel.POSITION: 3,
+    Channel.DIFFUSE_COLOR: 3,
+    Channel.OBJECT_INDEX: 1,
+}
+
+
+class Film:
+    """Accumulates the samples of one view. Its sums are targets of the view's texture pool."""
+
+    def __init__(self, device: Device) -> None:
+        self._context = device.context
+        self.samples = 0
+
+    def begin_sample(self, framebuffer: moderngl.Framebuffer) -> None:
+        """Bind the sums for adding one sample; the first one clears them."""
+        framebuffer.use()
+        if self.samples == 0:
+            framebuffer.clear()
+        self._context.enable_only(moderngl.BLEND)
+        self._context.blend_func = moderngl.ONE, moderngl.ONE
+
+    def mean(self, texture: moderngl.TextureArray, channel: Channel) -> Float32Array:
+        """The mean over the samples so far, (H, W, C) float32, row 0 at the bottom."""
+        width, height, _ = texture.size
+        sums = np.frombuffer(texture.read(), np.float32).reshape(height, width, 4)
+        return sums[..., : CHANNEL_COMPONENTS[channel]] / np.float32(max(self.samples, 1))

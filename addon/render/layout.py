@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The deep G-buffer's channels: what is stored per pixel and layer, in which format."""
+
+from dataclasses import dataclass
+
+_BYTES = {"f4": 4, "f2": 2, "f1": 1, "nu2": 2, "u2": 2}
+
+
+@dataclass(frozen=True)
+class TargetSpec:
+    """A texture array that passes write and read.
+
+    `components` 1, 2 or 4 of moderngl's `dtype` (f4/f2 floats, f1/nu2 normalised 8/16 bit, u2 unsigned 16 bit).
+    `layers`: array size. `clear`: value of every component where nothing is drawn.
+    """
+
+    name: str
+    components: int
+    dtype: str
+    layers: int = 1
+    clear: float = 0.0
+
+    @property
+    def bytes_per_pixel(self) -> int:
+        """Bytes of one pixel over all layers."""
+        return self.components * _BYTES[self.dtype] * self.layers
+
+
+@dataclass(frozen=True)
+class GBufferChannel:
+    """One channel: its format and the GLSL output that writes it; `meaning` is for the README's table."""
+
+    name: str
+    components: int
+    dtype: str
+    glsl_type: str
+    meaning: str
+    clear: float = 0.0
+
+    def target(self, layers: int) -> TargetSpec:
+        """The texture array that holds this channel for `layers` layers."""
+        return TargetSpec(f"gbuffer.{self.name}", self.components, self.dtype, layers, self.clear)
+
+
+CHANNELS = (
+    GBufferChannel(
+        "view_depth", 1, "f4", "float", "linear depth along the view axis, m; +inf where empty", float("inf")
+    ),
+    GBufferChannel("normal", 2, "nu2", "vec2", "world-space shading normal facing the viewer, octahedral"),
+    GBufferChannel("base_color", 4, "f2", "vec4", "scene-linear base colour; alpha holds F0, the specular reflectance"),
+    GBufferChannel("material", 2, "f1", "vec2", "metallic, roughness"),
+    GBufferChannel("emission", 4, "f4", "vec4", "emitted radiance, W/(sr·m²)"),
+    GBufferChannel("object_index", 1, "u2", "uint", "Blender's pass index"),
+)
+
+DEPTH_BYTES = 4
+"""The 32-bit float hardware depth buffer, shared by all layers."""
+
+
+def outputs_glsl(channels: tuple[GBufferChannel, ...]) -> str:
+    """GLSL fragment output declarations for the channels that are written, in attachment order."""
+    return "".join(
+        f"layout(location = {index}) out {channel.glsl_type} out_{channel.name};\n"
+        for index, channel in enumerate(channels)
+    )

@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The deep G-buffer: n layers with minimum separation, by sequential peeling (the two-pass reference construction)."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+
+from ...scene import BaseColorSource, ImageTexture, InstanceBatch, Material, Scene
+from ..device import Device
+from ..layout import CHANNELS, GBufferChannel, outputs_glsl
+from ..plan import PlannedPass, is_alpha_tested, is_invisible
+from ..programs import ProgramSpec
+from ..raw_gl import CLIP_DISTANCE0
+from ..uniforms import UniformBlock
+from .base import Frame, UniformBuffer, subsets
+
+GBUFFER_UNIFORMS = UniformBlock(
+    "GBufferUniforms",
+    (
+        ("clip_from_relative", "mat4"),
+        ("forward", "vec4"),
+        ("clip_end", "float"),
+        ("minimum_separation", "float"),
+        ("alpha_threshold", "float"),
+        ("layer", "int"),
+    ),
+)
+
+MATERIAL_UNIFORMS = UniformBlock(
+    "MaterialUniforms",
+    (
+        ("material_base_color", "vec4"),  # rgb, F0
+        ("material_emission", "vec4"),  # rgb, alpha
+        ("material_surface", "vec4"),  # metallic, roughness
+    ),
+)
+
+_SAMPLERS = ("base_color_texture", "view_depth_layers")
+_TEXTURE_UNIT, _DEPTH_UNIT = 0, 1
+_FRAME_BINDING, _MATERIAL_BINDING = 0, 1
+
+
+@dataclass(frozen=True)
+class Draw:
+    """One instanced draw: the triangles of one slot of one batch."""
+
+    batch: InstanceBatch
+    vertex_array: moderngl.VertexArray
+    first_index: int
+    index_count: int
+    material_offset: int
+    texture: ImageTexture | None
+
+
+class GBufferPass:
+    """Draws every batch once per layer; layer k discards what is not behind layer k − 1 by more than Δz."""
+
+    name = "gbuffer"
+
+    def __init__(self, device: Device) -> None:
+        self._device = device
+        self._uniforms = UniformBuffer(device, GBUFFER_UNIFORMS)
+        self._materials: moderngl.Buffer | None = None
+        self._draws: list[Draw] = []
+
+    @classmethod
+    def variants(cls) -> Iterator[ProgramSpec]:
+        """Every surface kind with every set of channels besides view depth, peeling or not."""
+        optional = [channel.name for channel in CHANNELS if channel.name != "view_depth"]
+        surfaces = (frozenset[str](), {"TEXTURE"}, {"TEXTURE", "ALPHA_TEST"}, {"ATTRIBUTE"})
+        for names in subsets(optional):
+            channels = tuple(channel for channel in CHANNELS if channel.name in names | {"view_depth"})
+            for surface in surfaces:
+                for peel in (frozenset[str](), {"PEEL"}):
+                    yield _program(channels, frozenset(surface | peel))
+
+    @property
+    def draws(self) -> int:
+        """Draw calls per layer."""
+        return len(self._draws)
+
+    @property
+    def triangles(self) -> int:
+        """Triangles per layer, instances counted."""
+        return sum(draw.index_count // 3 * draw.batch.count for draw in self._draws)
+
+    def prepare(self, frame: Frame, planned: PlannedPass) -> None:
+        """Upload material constants and build the draw list. Draws are ordered by key, not by submission."""
+        offsets = self._upload_materials(frame.scene)
+        self._draws = []
+        for batch in sorted(frame.scene.batches, key=lambda batch: batch.key):
+            mesh = frame.scene.meshes[batch.mesh]
+            for slot in mesh.slots:
+                material = frame.scene.materials[batch.materials[min(slot.slot, len(batch.materials) - 1)]]
+                if slot.count == 0 or is_invisible(material, frame.settings):
+                    continue
+                spec = _program(frame.plan.channels, _surface_defines(material) | planned.defines)
+                program = self._device.programs.get(spec)
+                self._draws.append(
+                    Draw(
+                        batch,
+                        frame.geometry.vertex_array(batch, program),
+                        3 * slot.first,
+                        3 * slot.count,
+                        offsets[material.key],
+                        material.texture if "TEXTURE" in spec.defines else None,
+                    )
+                )
+
+    def run(self, frame: Frame, planned: PlannedPass) -> None:
+        """Draw all layers, nearest first."""
+        context = self._device.context
+        names = tuple(target.name for target in planned.writes)
+        for layer in range(frame.plan.layers):
+            framebuffer = frame.pool.framebuffer(names, layer, depth=True)
+            framebuffer.use()
+            framebuffer.clear(depth=0.0)
+            frame.pool.clear(names)
+            context.enable_only(moderngl.DEPTH_TEST)
+            context.enable_direct(CLIP_DISTANCE0)
+            context.depth_func = ">"
+            if "PEEL" in planned.defines:
+                frame.pool.texture("gbuffer.view_depth").use(_DEPTH_UNIT)
+            self._bind_frame(frame, layer)
+            self._draw_all(frame)
+        context.disable_direct(CLIP_DISTANCE0)
+
+    def release(self) -> None:
+        """Free the pass's buffers."""
+        self._draws = []
+        self._uniforms.release()
+        if self._materials is not None:
+            self._materials.release()
+
+    def _draw_all(self, frame: Frame) -> None:
+        assert self._materials is not None
+        size = MATERIAL_UNIFORMS.dtype.itemsize
+        for draw in self._draws:
+            self._materials.bind_to_uniform_block(_MATERIAL_BINDING, offset=draw.material_offset, size=size)
+            if draw.texture is not None:
+                frame.images.use(draw.texture, _TEXTURE_UNIT)
+            draw.vertex_array.render(
+                moderngl.TRIANGLES, vertices=draw.index_count, first=draw.first_index, instances=draw.batch.count
+            )
+        self._device.context.clear_samplers()
+
+    def _bind_frame(self, frame: Frame, layer: int) -> None:
+        camera = frame.camera
+        camera_from_relative = np.eye(4)
+        camera_from_relative[:3, :3] = camera.rotation.T
+        projection = camera.projection(zero_to_one_depth=self._device.zero_to_one_depth)
+        self._uniforms.bind(
+            _FRAME_BINDING,
+            clip_from_relative=projection @ camera_from_relative,
+            forward=(*-camera.rotation[:, 2], 0.0),
+            clip_end=camera.clip_end,
+            minimum_separation=frame.settings.minimum_separation,
+            alpha_threshold=frame.settings.alpha_threshold,
+            layer=layer,
+        )
+
+    def _upload_materials(self, scene: Scene) -> dict[str, int]:
+        alignment = self._device.uniform_alignment
+        stride = -(-MATERIAL_UNIFORMS.dtype.itemsize // alignment) * alignment
+        packed = b"".join(_pack_material(material).ljust(stride, b"\0") for material in scene.materials.values())
+        if self._materials is not None:
+            self._materials.release()
+        self._materials = self._device.context.buffer(packed) if packed else self._device.context.buffer(reserve=stride)
+        return {key: index * stride for index, key in enumerate(scene.materials)}
+
+
+def _surface_defines(material: Material) -> frozenset[str]:
+    if material.source is BaseColorSource.TEXTURE and material.texture is not None:
+        return frozenset({"TEXTURE", "ALPHA_TEST"} if is_alpha_tested(material) else {"TEXTURE"})
+    return frozenset({"ATTRIBUTE"} if material.source is BaseColorSource.ATTRIBUTE else ())
+
+
+def _program(channels: tuple[GBufferChannel, ...], defines: frozenset[str]) -> ProgramSpec:
+    return ProgramSpec(
+        vertex="gbuffer/gbuffer.vert",
+        fragment="gbuffer/gbuffer.frag",
+        defines=defines | {f"WRITE_{channel.name.upper()}" for channel in channels},
+        blocks=(GBUFFER_UNIFORMS, MATERIAL_UNIFORMS),
+        samplers=_SAMPLERS,
+        generated=(("outputs", outputs_glsl(channels)),),
+    )
+
+
+def _pack_material(material: Material) -> bytes:
+    return MATERIAL_UNIFORMS.pack(
+        material_base_color=(*material.base_color, material.specular),
+        material_emission=(*material.emission, material.alpha),
+        material_surface=(material.metallic, material.roughness, 0.0, 0.0),
+    )

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sample patterns: a low-discrepancy sequence and the pixel filter."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from ..scene.arrays import Float64Array
+
+_DIMENSIONS = 4
+_FILTER_TABLE_SIZE = 1024
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What one sample draws at random, the same for every pixel.
+
+    `index` 0, 1, …; `pixel_offset` (x, y) from the pixel centre, pixels; `light` (u, v) in [0, 1).
+    """
+
+    index: int
+    pixel_offset: tuple[float, float]
+    light: tuple[float, float]
+
+
+def film_sample(index: int, filter_radius: float, seed: int) -> Sample:
+    """Sample `index` of a pixel whose Blackman–Harris filter has `filter_radius` (pixels).
+
+    Sample 0 goes through the pixel centre and the middle of every light, whatever the seed.
+    """
+    x, y, u, v = sequence_point(index, seed)
+    return Sample(index, (filter_offset(x, filter_radius), filter_offset(y, filter_radius)), (u, v))
+
+
+def sequence_point(index: int, seed: int) -> tuple[float, float, float, float]:
+    """Point `index` in [0, 1)⁴ of the Kronecker sequence with the generalised golden ratio.
+
+    Roberts 2018, "The Unreasonable Effectiveness of Quasirandom Sequences": α_j = φ^−(j+1), φ⁵ = φ + 1. A seed
+    other than 0 starts at another stretch of the same sequence; point 0 is always the centre.
+    """
+    if index == 0:
+        return (0.5, 0.5, 0.5, 0.5)
+    start = int(np.random.default_rng(seed).integers(1 << 24)) if seed else 0
+    point = np.modf(0.5 + (start + index) * _kronecker_steps())[0]
+    return (float(point[0]), float(point[1]), float(point[2]), float(point[3]))
+
+
+@lru_cache(maxsize=1)
+def _kronecker_steps() -> Float64Array:
+    ratio = 1.0
+    for _ in range(64):
+        ratio = (1.0 + ratio) ** (1.0 / (_DIMENSIONS + 1))
+    return ratio ** -np.arange(1.0, _DIMENSIONS + 1)
+
+
+def filter_offset(u: float, radius: float) -> float:
+    """Offset from the pixel centre (pixels) whose distribution is the Blackman–Harris filter, for u in [0, 1)."""
+    cumulative, offsets = _blackman_harris_cdf()
+    return float(np.interp(u, cumulative, offsets)) * radius
+
+
+@lru_cache(maxsize=1)
+def _blackman_harris_cdf() -> tuple[Float64Array, Float64Array]:
+    """Cumulative distribution over offsets −1…1. Coefficients: Harris 1978, 4-term minimum, −92 dB."""
+    offsets = np.linspace(-1.0, 1.0, _FILTER_TABLE_SIZE + 1)
+    middle = 0.5 * (offsets[1:] + offsets[:-1])
+    phase = np.pi * (middle + 1.0)
+    weights = 0.35875 - 0.48829 * np.cos(phase) + 0.14128 * np.cos(2 * phase) - 0.01168 * np.cos(3 * phase)
+    cumulative = np.concatenate([[0.0], np.cumsum(weights)])
+    return cumulative / cumulative[-1], offsets

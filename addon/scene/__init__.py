@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Plain scene data: frozen dataclasses of numpy arrays. No Blender, no OpenGL.
+
+Everything here is a value: arrays are never written to after construction, so a scene may be read by the GL
+thread while `sync` builds the next one. What changed between two scenes is told by keys and versions.
+"""
+
+from .camera import Camera
+from .geometry import InstanceBatch, Mesh, SlotRange
+from .lights import AreaShape, Light, LightKind
+from .materials import BaseColorSource, Extension, Image, ImageTexture, Interpolation, Material
+from .scene import Scene, Versions, World
+from .settings import Channel, DebugView, RenderSettings
+
+__all__ = [
+    "AreaShape",
+    "BaseColorSource",
+    "Camera",
+    "Channel",
+    "DebugView",
+    "Extension",
+    "Image",
+    "ImageTexture",
+    "InstanceBatch",
+    "Interpolation",
+    "Light",
+    "LightKind",
+    "Material",
+    "Mesh",
+    "RenderSettings",
+    "Scene",
+    "SlotRange",
+    "Versions",
+    "World",
+]

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Triangle meshes and where they are placed."""
+
+from dataclasses import dataclass
+
+from .arrays import Float32Array, Float64Array, Int32Array, UInt32Array
+
+
+@dataclass(frozen=True)
+class SlotRange:
+    """The triangles of one material slot: rows `first` … `first + count - 1` of `Mesh.triangles`."""
+
+    slot: int
+    first: int
+    count: int
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """An indexed triangle mesh in object space.
+
+    `positions` (V, 3) float32, metres; finite.
+    `normals` (V, 3) float32, unit length or zero where undefined (the shader falls back to the geometric normal).
+    `uvs` (V, 2) float32 of the first UV map, or None. `colors` (V, 4) float32 scene-linear, or None.
+    `triangles` (T, 3) uint32 rows of `positions`, counter-clockwise from the front, grouped by slot.
+    `slots` ranges in ascending order that together cover `triangles`.
+    `version` differs whenever any array differs from that of an earlier mesh with the same `key`.
+    """
+
+    key: str
+    name: str
+    version: int
+    positions: Float32Array
+    normals: Float32Array
+    triangles: UInt32Array
+    slots: tuple[SlotRange, ...]
+    uvs: Float32Array | None = None
+    colors: Float32Array | None = None
+
+
+@dataclass(frozen=True)
+class InstanceBatch:
+    """Placements of one mesh with one assignment of materials; drawn as one instanced draw per slot.
+
+    `key` is stable across syncs and orders the draws, so that the picture does not depend on submission order.
+    `materials` holds a key into `Scene.materials` per slot of the mesh (slot i uses `materials[min(i, last)]`).
+    `matrices` (N, 4, 4) float64, row-major world-from-object, acting on column vectors.
+    `object_index` (N,) int32: Blender's pass index.
+    `version` differs whenever matrices or indices differ from those of an earlier batch with the same `key`.
+    """
+
+    key: str
+    mesh: str
+    materials: tuple[str, ...]
+    version: int
+    matrices: Float64Array
+    object_index: Int32Array
+
+    @property
+    def count(self) -> int:
+        """Number of instances."""
+        return len(self.matrices)
