@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 
 import moderngl
 
+from .ggx_albedo import TABLE_SIZE, ggx_albedo_table
 from .programs import ProgramLibrary
 from .raw_gl import RawGL
 
@@ -28,19 +29,22 @@ class DeviceError(RuntimeError):
 
 
 class Device:
-    """An OpenGL ≥ 4.10 core context and what is shared by every view: its programs and its limits."""
+    """An OpenGL ≥ 4.10 core context and what is shared by every view: its programs, tables and limits."""
 
     def __init__(self) -> None:
         self.context = _create_context()
         self.raw = RawGL(self.context)
         self.zero_to_one_depth = self.raw.use_zero_to_one_depth()
         self.programs = ProgramLibrary(self.context)
+        self.ggx_albedo = self.context.texture((TABLE_SIZE, TABLE_SIZE), 2, ggx_albedo_table(), dtype="f4")
+        self.ggx_albedo.repeat_x = self.ggx_albedo.repeat_y = False
         self.name = f"{self.context.info['GL_RENDERER']}, OpenGL {self.context.info['GL_VERSION']}"
         self.maximum_size = min(self.context.info["GL_MAX_TEXTURE_SIZE"], *self.context.info["GL_MAX_VIEWPORT_DIMS"])
         self.uniform_alignment: int = self.context.info["GL_UNIFORM_BUFFER_OFFSET_ALIGNMENT"]
 
     def release(self) -> None:
-        """Free the programs and the context."""
+        """Free the shared objects and the context."""
+        self.ggx_albedo.release()
         self.programs.release()
         self.context.release()
 

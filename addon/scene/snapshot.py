@@ -5,6 +5,7 @@ A snapshot saved on a machine with Blender renders on one without.
 """
 
 import json
+import types
 import typing
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
@@ -70,8 +71,8 @@ def _restore(kind: Any, value: Any, arrays: Mapping[str, np.ndarray[Any, Any]]) 
     if value is None:
         return None
     if is_dataclass(kind):
-        types = typing.get_type_hints(kind)
-        return kind(**{name: _restore(types[name], item, arrays) for name, item in value.items()})  # pyright: ignore
+        hints = typing.get_type_hints(kind)
+        return kind(**{name: _restore(hints[name], item, arrays) for name, item in value.items()})  # pyright: ignore
     if isinstance(kind, type) and issubclass(kind, Enum):
         return kind(value)
     return _restore_generic(kind, value, arrays)
@@ -80,12 +81,12 @@ def _restore(kind: Any, value: Any, arrays: Mapping[str, np.ndarray[Any, Any]]) 
 def _restore_generic(kind: Any, value: Any, arrays: Mapping[str, np.ndarray[Any, Any]]) -> Any:
     """The value of a parametrised or basic type from its JSON."""
     origin, arguments = typing.get_origin(kind), typing.get_args(kind)
-    if not arguments:
-        return value
-    if isinstance(value, dict):
-        return {key: _restore(arguments[1], item, arrays) for key, item in value.items()}
+    if origin in (types.UnionType, typing.Union):
+        # Optional: the one alternative that is not None. Arrays and None were restored before.
+        return _restore(next(item for item in arguments if item is not type(None)), value, arrays)
     if origin is tuple:
         item_types = [arguments[0]] * len(value) if arguments[-1] is Ellipsis else arguments
         return tuple(_restore(item, part, arrays) for item, part in zip(item_types, value, strict=True))
-    # Optional: the one alternative that is not None. Unions of arrays were restored before.
-    return _restore(next(item for item in arguments if item is not type(None)), value, arrays)
+    if isinstance(value, dict):
+        return {key: _restore(arguments[1], item, arrays) for key, item in value.items()}
+    return value

@@ -6,33 +6,56 @@
 // Cycles clamps roughness alike; below it the highlight of a light sample is narrower than float32 resolves.
 const float SMALLEST_ALPHA = 1e-3;
 
+// (roughness, n·v) -> scale and bias of F0 and F90 in the directional albedo; render/ggx_albedo.py integrates it.
+uniform sampler2D ggx_albedo_table;
+
+/** Scale of F0 and bias for F90; the table's nodes are the centres of its texels. */
+vec2 lookup_ggx_albedo(float roughness, float n_dot_v)
+{
+    vec2 size = vec2(textureSize(ggx_albedo_table, 0));
+    return textureLod(ggx_albedo_table, (vec2(roughness, n_dot_v) * (size - 1.0) + 0.5) / size, 0.0).rg;
+}
+
 struct Surface
 {
     vec3 diffuse_albedo;    // share of incident light that leaves diffusely
+    vec3 specular_albedo;   // share that is reflected specularly, for unit light from everywhere
     vec3 specular_f0;       // reflectance at normal incidence
+    vec3 multiple_scattering; // factor that returns what single scattering between microfacets loses
     float alpha;            // GGX roughness, the square of the perceptual one
 };
 
-/**
- * Directional albedo of GGX with Schlick's Fresnel term, for unit light from everywhere.
- * Analytic fit of the split-sum tables: Karis 2014, "Physically Based Shading on Mobile".
- */
-vec3 specular_albedo(vec3 f0, float roughness, float n_dot_v)
+/** Reflectance at grazing incidence: 1, but nothing where there is no specular layer at all. */
+vec3 grazing_reflectance(vec3 f0)
 {
-    vec4 r = roughness * vec4(-1.0, -0.0275, -0.572, 0.022) + vec4(1.0, 0.0425, 1.04, -0.04);
-    float a = min(r.x * r.x, exp2(-9.28 * n_dot_v)) * r.x + r.y;
-    vec2 scale_bias = vec2(-1.04, 1.04) * a + r.zw;
-    // A surface without any specular reflectance has no Fresnel reflection either.
-    return f0 * scale_bias.x + scale_bias.y * clamp(50.0 * f0, 0.0, 1.0);
+    return clamp(50.0 * f0, 0.0, 1.0);
 }
 
-/** The surface of a G-buffer texel: what the specular layer reflects is taken from the diffuse layer below it. */
+/**
+ * Factor on single-scattering GGX that makes a white metal reflect everything.
+ * Turquin 2019, "Practical multiple scattering compensation for microfacet models", eq. 16; `albedo` from the table.
+ */
+vec3 multiple_scattering_factor(vec3 f0, vec2 albedo)
+{
+    float single = albedo.x + albedo.y;
+    return 1.0 + f0 * (1.0 - single) / single;
+}
+
+/** Share of light from everywhere that GGX reflects, multiple scattering included. */
+vec3 directional_albedo(vec3 f0, vec2 albedo)
+{
+    return (f0 * albedo.x + grazing_reflectance(f0) * albedo.y) * multiple_scattering_factor(f0, albedo);
+}
+
+/** The surface of a G-buffer texel: what the dielectric layer reflects is taken from the diffuse one below it. */
 Surface make_surface(vec3 base_color, float f0, float metallic, float roughness, float n_dot_v)
 {
+    vec2 albedo = lookup_ggx_albedo(roughness, n_dot_v);
     Surface surface;
     surface.specular_f0 = mix(vec3(f0), base_color, metallic);
-    vec3 dielectric = specular_albedo(vec3(f0), roughness, n_dot_v);
-    surface.diffuse_albedo = base_color * (1.0 - metallic) * (1.0 - dielectric);
+    surface.diffuse_albedo = base_color * (1.0 - metallic) * (1.0 - directional_albedo(vec3(f0), albedo));
+    surface.specular_albedo = directional_albedo(surface.specular_f0, albedo);
+    surface.multiple_scattering = multiple_scattering_factor(surface.specular_f0, albedo);
     surface.alpha = max(roughness * roughness, SMALLEST_ALPHA);
     return surface;
 }
@@ -56,6 +79,6 @@ vec3 specular_brdf_cosine(Surface surface, vec3 normal, vec3 view, vec3 light)
     float masking = n_dot_l * sqrt(n_dot_v * n_dot_v * (1.0 - a2) + a2);
     float shadowing = n_dot_v * sqrt(n_dot_l * n_dot_l * (1.0 - a2) + a2);
     float weight = pow(1.0 - clamp(dot(light, halfway), 0.0, 1.0), 5.0);
-    vec3 fresnel = surface.specular_f0 + (clamp(50.0 * surface.specular_f0, 0.0, 1.0) - surface.specular_f0) * weight;
-    return fresnel * distribution * 0.5 / (masking + shadowing) * n_dot_l;
+    vec3 fresnel = mix(surface.specular_f0, grazing_reflectance(surface.specular_f0), weight);
+    return surface.multiple_scattering * fresnel * distribution * 0.5 / (masking + shadowing) * n_dot_l;
 }

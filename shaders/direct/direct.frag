@@ -67,8 +67,7 @@ void main()
     radiance += lit_radiance(surface, relative_position(gl_FragCoord.xy, view_depth), normal, view);
 #endif
 #ifdef WORLD
-    radiance += world_radiance.rgb
-                * (surface.diffuse_albedo + specular_albedo(surface.specular_f0, material.g, n_dot_v));
+    radiance += world_radiance.rgb * (surface.diffuse_albedo + surface.specular_albedo);
 #endif
     out_radiance = vec4(finite_or_zero(radiance), 1.0);
 }

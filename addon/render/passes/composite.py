@@ -52,6 +52,7 @@ class CompositePass:
         spec = _program(planned.defines)
         frame.film.begin_sample(frame.pool.framebuffer(tuple(target.name for target in planned.writes), 0))
         bind_targets(frame, spec, planned)
+        self._device.ggx_albedo.use(spec.samplers.index("ggx_albedo_table"))
         bind_camera(self._camera, _CAMERA_BINDING, frame)
         debug = frame.settings.debug_view is not DebugView.NONE
         visible = not debug and not frame.settings.transparent_film
@@ -79,6 +80,6 @@ def _program(defines: frozenset[str]) -> ProgramSpec:
         fragment="composite/composite.frag",
         defines=defines,
         blocks=(CAMERA_UNIFORMS, COMPOSITE_UNIFORMS),
-        samplers=(*GBUFFER_SAMPLERS.values(), "radiance_layers"),
+        samplers=(*GBUFFER_SAMPLERS.values(), "radiance_layers", "ggx_albedo_table"),
         generated=(("outputs", outputs),),
     )

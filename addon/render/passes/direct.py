@@ -64,6 +64,7 @@ class DirectPass:
         spec = _program(planned.defines)
         self._device.context.enable_only(moderngl.NOTHING)
         bind_targets(frame, spec, planned)
+        self._device.ggx_albedo.use(spec.samplers.index("ggx_albedo_table"))
         if self._lights is not None:
             self._lights.use(spec.samplers.index("light_table"))
         bind_camera(self._camera, _CAMERA_BINDING, frame)
@@ -93,5 +94,5 @@ def _program(defines: frozenset[str]) -> ProgramSpec:
         fragment="direct/direct.frag",
         defines=defines,
         blocks=(CAMERA_UNIFORMS, DIRECT_UNIFORMS),
-        samplers=(*GBUFFER_SAMPLERS.values(), "light_table"),
+        samplers=(*GBUFFER_SAMPLERS.values(), "light_table", "ggx_albedo_table"),
     )

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+from dataclasses import replace
+
+import pytest
+
+from addon.render import plan
+from addon.render.layout import CHANNELS, DEPTH_BYTES
+from addon.scene import Channel, DebugView, RenderSettings
+from blender_tests import builders
+
+SETTINGS = RenderSettings(64, 64, layers=4)
+LIT = builders.scene(builders.quad("q"), lights=(builders.light(),))
+
+
+def names(planned):
+    return [item.name for item in planned.passes]
+
+
+def reasons(planned):
+    return {item.name: item.reason for item in planned.left_out}
+
+
+def test_a_lit_scene_needs_every_pass():
+    assert names(plan(LIT, SETTINGS)) == ["gbuffer", "direct", "composite"]
+
+
+def test_layers_nobody_reads_are_left_out_with_the_reason():
+    planned = plan(LIT, SETTINGS)
+    assert planned.layers == 1
+    assert "nothing reads them" in reasons(planned)["gbuffer layers 2–4"]
+    assert "Δz unused" in reasons(planned)["minimum separation"]
+    assert "PEEL" not in planned.find("gbuffer").defines
+
+
+@pytest.mark.parametrize(
+    ("change", "layers"),
+    [
+        ({"deep_output": True}, 4),
+        ({"debug_view": DebugView.NORMAL, "debug_layer": 2}, 3),
+        ({"debug_view": DebugView.NORMAL, "debug_layer": 7}, 4),
+        ({"debug_layer": 2}, 1),
+    ],
+)
+def test_layers_are_built_for_whoever_reads_them(change, layers):
+    planned = plan(LIT, replace(SETTINGS, **change))
+    assert planned.layers == layers
+    assert all(target.layers == layers for target in planned.find("gbuffer").writes)
+
+
+def test_nothing_to_light_with_means_no_direct_pass():
+    dark = builders.scene(builders.quad("q"))
+    planned = plan(dark, SETTINGS)
+    assert names(planned) == ["gbuffer", "composite"]
+    assert reasons(planned)["direct"] == "no light, emission or world"
+    assert [target.name for target in planned.find("gbuffer").writes] == ["gbuffer.view_depth"]
+    assert reasons(plan(replace(LIT, batches=()), SETTINGS))["direct"] == "no geometry"
+
+
+def test_emission_and_world_are_compiled_only_where_there_are_any():
+    assert plan(LIT, SETTINGS).find("direct").defines == {"LIGHTS"}
+    world = builders.scene(builders.quad("q"), world=(0.1, 0.0, 0.0))
+    assert plan(world, SETTINGS).find("direct").defines == {"WORLD"}
+    lamp = builders.scene(builders.quad("q"), materials=(builders.material(emission=(1.0, 0, 0)),))
+    planned = plan(lamp, SETTINGS)
+    assert planned.find("direct").defines == {"EMISSION"}
+    assert "gbuffer normal" in reasons(planned)
+
+
+def test_a_debug_view_of_the_gbuffer_needs_no_light():
+    planned = plan(LIT, replace(SETTINGS, debug_view=DebugView.NORMAL))
+    assert names(planned) == ["gbuffer", "composite"]
+    assert planned.find("composite").defines == {"DEBUG_NORMAL"}
+
+
+def test_film_images_bring_their_channels():
+    planned = plan(LIT, replace(SETTINGS, channels=frozenset({Channel.OBJECT_INDEX, Channel.NORMAL})))
+    assert "gbuffer.object_index" in [target.name for target in planned.find("gbuffer").writes]
+    assert planned.find("composite").defines == {"DIRECT", "FILM_NORMAL"}
+    assert [target.name for target in planned.find("composite").writes] == ["film.combined", "film.normal"]
+
+
+@pytest.mark.parametrize("deep", [False, True])
+def test_what_is_read_is_written(deep):
+    planned = plan(LIT, replace(SETTINGS, deep_output=deep, channels=frozenset(Channel)))
+    written = {target.name for target in planned.targets}
+    assert all(set(item.reads) <= written for item in planned.passes)
+
+
+def test_a_layer_takes_no_more_than_48_bytes_per_pixel():
+    assert sum(channel.target(1).bytes_per_pixel for channel in CHANNELS) + DEPTH_BYTES <= 48
