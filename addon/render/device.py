@@ -50,7 +50,7 @@ class Device:
 
 
 def _create_context() -> moderngl.Context:
-    backends = ({"backend": "egl"}, {}) if sys.platform.startswith("linux") else ({},)
+    backends: tuple[dict[str, Any], ...] = ({"backend": "egl"}, {}) if sys.platform.startswith("linux") else ({},)
     failures: list[str] = []
     for backend in backends:
         try:

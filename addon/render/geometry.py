@@ -2,18 +2,19 @@
 """The scene's geometry on the GPU: buffers mirror meshes and batches, and only what changed is uploaded."""
 
 from collections.abc import Iterable
+from typing import Any
 
 import moderngl
 import numpy as np
 
 from ..scene import InstanceBatch, Mesh, Scene
-from ..scene.arrays import Float64Array
+from ..scene.arrays import Float32Array, Float64Array
 from .device import Device
 
 MESH_ATTRIBUTES = ("3f", "in_position"), ("3f", "in_normal"), ("2f", "in_uv"), ("4f", "in_color")
-INSTANCE_FORMAT = "4f 4f 4f 1i/i"
-INSTANCE_ATTRIBUTES = ("in_row_0", "in_row_1", "in_row_2", "in_object_index")
-_INSTANCE_DTYPE = np.dtype([("rows", "f4", (3, 4)), ("object_index", "i4")])
+INSTANCE_FORMAT = "4f 4f 4f 3f 1i/i"
+INSTANCE_ATTRIBUTES = ("in_row_0", "in_row_1", "in_row_2", "in_translation_low", "in_object_index")
+_INSTANCE_DTYPE = np.dtype([("rows", "f4", (3, 4)), ("translation_low", "f4", 3), ("object_index", "i4")])
 
 
 class MeshBuffers:
@@ -21,7 +22,6 @@ class MeshBuffers:
 
     def __init__(self, context: moderngl.Context, mesh: Mesh) -> None:
         self.version = mesh.version
-        self.slots = mesh.slots
         arrays = (mesh.positions, mesh.normals, mesh.uvs, mesh.colors)
         self.attributes = [
             (context.buffer(np.ascontiguousarray(array, np.float32)), layout, name)
@@ -39,32 +39,32 @@ class MeshBuffers:
 
 
 class InstanceBuffer:
-    """Per-instance data of one batch, relative to the camera's position."""
+    """Per-instance data of one batch."""
 
-    def __init__(self, context: moderngl.Context, batch: InstanceBatch, origin: Float64Array) -> None:
+    def __init__(self, context: moderngl.Context, batch: InstanceBatch) -> None:
         self.version = batch.version
-        self.count = batch.count
-        self.buffer = context.buffer(pack_instances(batch, origin))
-
-    def move(self, batch: InstanceBatch, origin: Float64Array) -> None:
-        """Write the batch again for a camera at another place."""
-        self.buffer.write(pack_instances(batch, origin))
+        self.buffer = context.buffer(pack_instances(batch))
 
     def release(self) -> None:
         """Free the buffer."""
         self.buffer.release()
 
 
-def pack_instances(batch: InstanceBatch, origin: Float64Array) -> bytes:
-    """Rows of the camera-relative matrices and pass indices, as the vertex shader reads them.
+def split_float64(values: Float64Array) -> tuple[Float32Array, Float32Array]:
+    """High and low float32 parts whose exact sum keeps 48 bits of each value.
 
-    The camera position `origin` (3,) is subtracted in float64, so that float32 keeps its precision near the camera
-    wherever in the world that is.
+    Differences taken part by part on the GPU are then as good as a float64 subtraction rounded to float32, so that
+    precision near the camera does not depend on where in the world that is, and a camera move uploads nothing.
     """
-    relative = batch.matrices[:, :3, :].copy()
-    relative[:, :, 3] -= origin
+    high = values.astype(np.float32)
+    return high, (values - high).astype(np.float32)
+
+
+def pack_instances(batch: InstanceBatch) -> bytes:
+    """Matrix rows, low parts of the translations and pass indices, as the vertex shader reads them."""
     packed = np.empty(batch.count, _INSTANCE_DTYPE)
-    packed["rows"] = relative
+    packed["rows"] = batch.matrices[:, :3, :]
+    packed["rows"][:, :, 3], packed["translation_low"] = split_float64(batch.matrices[:, :3, 3])
     packed["object_index"] = batch.object_index
     return packed.tobytes()
 
@@ -76,11 +76,10 @@ class GeometryStore:
         self._context = device.context
         self._meshes: dict[str, MeshBuffers] = {}
         self._batches: dict[str, InstanceBuffer] = {}
-        self._origin = np.zeros(3)
         self._vertex_arrays: dict[tuple[str, str, moderngl.Program], moderngl.VertexArray] = {}
 
-    def update(self, scene: Scene, origin: Float64Array) -> bool:
-        """Mirror the scene around the camera position `origin` (3,) float64; whether any buffer was replaced."""
+    def update(self, scene: Scene) -> None:
+        """Mirror the scene."""
         replaced = self._drop(
             self._meshes, (key for key, held in self._meshes.items() if _is_stale(held, scene.meshes.get(key)))
         )
@@ -90,31 +89,20 @@ class GeometryStore:
         )
         if replaced:
             self._release_vertex_arrays()
-        moved = not np.array_equal(origin, self._origin)
         for batch in scene.batches:
             if batch.mesh not in self._meshes:
                 self._meshes[batch.mesh] = MeshBuffers(self._context, scene.meshes[batch.mesh])
-                replaced = True
             if batch.key not in self._batches:
-                self._batches[batch.key] = InstanceBuffer(self._context, batch, origin)
-                replaced = True
-            elif moved:
-                self._batches[batch.key].move(batch, origin)
-        self._origin = origin.copy()
-        return replaced
-
-    def slots(self, batch: InstanceBatch) -> MeshBuffers:
-        """The buffers of a batch's mesh."""
-        return self._meshes[batch.mesh]
+                self._batches[batch.key] = InstanceBuffer(self._context, batch)
 
     def vertex_array(self, batch: InstanceBatch, program: moderngl.Program) -> moderngl.VertexArray:
         """The vertex array that draws a batch with a program."""
         key = (batch.key, batch.mesh, program)
         if key not in self._vertex_arrays:
             mesh = self._meshes[batch.mesh]
-            content = [attribute for attribute in mesh.attributes if attribute[2] in program]
+            content: list[tuple[Any, ...]] = [attribute for attribute in mesh.attributes if attribute[2] in program]
             used = [name for name in INSTANCE_ATTRIBUTES if name in program]
-            instance_layout = INSTANCE_FORMAT if "in_object_index" in program else "4f 4f 4f 4x/i"
+            instance_layout = INSTANCE_FORMAT if "in_object_index" in program else "4f 4f 4f 3f 4x/i"
             content.append((self._batches[batch.key].buffer, instance_layout, *used))
             self._vertex_arrays[key] = self._context.vertex_array(program, content, mesh.indices, index_element_size=4)
         return self._vertex_arrays[key]

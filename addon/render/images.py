@@ -8,8 +8,6 @@ from ..scene import Extension, Image, ImageTexture, Interpolation, Scene
 from .device import Device
 from .raw_gl import SRGB8_ALPHA8
 
-MAXIMUM_ANISOTROPY = 4.0
-
 
 class ImageStore:
     """GPU mirror of `Scene.images`, and the sampler objects that textures use."""
@@ -80,7 +78,6 @@ class ImageStore:
                     if closest
                     else (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
                 ),
-                anisotropy=1.0 if closest else min(MAXIMUM_ANISOTROPY, self._device.context.max_anisotropy),
             )
             if texture.extension is Extension.CLIP:
                 sampler.border_color = (0.0, 0.0, 0.0, 0.0)

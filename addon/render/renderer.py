@@ -43,7 +43,7 @@ class Renderer:
         Raises RenderError where the device cannot hold the targets, ShaderError where a shader is broken.
         """
         start = time.perf_counter()
-        self._geometry.update(scene, camera.position)
+        self._geometry.update(scene)
         self._warnings = tuple(self._images.update(scene))
         self._upload_seconds = time.perf_counter() - start
         planned = plan(scene, settings)

@@ -16,7 +16,7 @@ class TexturePool:
 
     def __init__(self, device: Device) -> None:
         self._device = device
-        self._size = (0, 0)
+        self._size: tuple[int, int] = (0, 0)
         self._specs: dict[str, TargetSpec] = {}
         self._textures: dict[str, moderngl.TextureArray] = {}
         self._depth: moderngl.Texture | None = None
@@ -109,7 +109,10 @@ class TexturePool:
 
     def _allocate(self, spec: TargetSpec) -> moderngl.TextureArray:
         try:
-            texture = self._device.context.texture_array((*self._size, spec.layers), spec.components, dtype=spec.dtype)
+            width, height = self._size
+            texture = self._device.context.texture_array(
+                (width, height, spec.layers), spec.components, dtype=spec.dtype
+            )
         except moderngl.Error as error:
             raise self._too_large(spec.name, spec.bytes_per_pixel) from error
         self._check_memory(spec.name, spec.bytes_per_pixel)

@@ -144,9 +144,7 @@ def test_colour_attributes_tint_the_base_colour(render):
 
 def test_slots_use_their_own_material_and_the_last_one_beyond(render):
     corners = [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)]
-    mesh = builders.mesh(
-        "q", corners, [(0, 1, 2), (0, 2, 3)], slots=(SlotRange(0, 0, 1), SlotRange(5, 1, 1))
-    )
+    mesh = builders.mesh("q", corners, [(0, 1, 2), (0, 2, 3)], slots=(SlotRange(0, 0, 1), SlotRange(5, 1, 1)))
     materials = (builders.material("a", base_color=(1, 0, 0)), builders.material("b", base_color=(0, 1, 0)))
     scene = builders.scene(mesh, materials=materials, batches=[builders.batch("q", materials=("a", "b"))])
     albedo = render(scene, builders.camera(half_width=0.33), deep_output=True).layers[0].albedo
@@ -167,7 +165,7 @@ def test_nothing_beyond_the_clip_range_is_drawn(render, orthographic):
 
 def test_geometry_far_from_the_origin_keeps_its_precision(render):
     """A million metres out, a float32 world position is good to 6 cm; camera-relative depth to 1e-6."""
-    offset = np.float64([1e6, -2e6, 5e5])
+    offset = np.float64([1e6 + 0.3, -2e6 + 0.7, 5e5 + 0.123])
     place = builders.translation(*offset)
     camera = replace(builders.camera(), world_from_camera=place @ builders.camera().world_from_camera)
     scene = builders.scene(builders.quad("q", z=0.125), batches=[builders.batch("q", [place])])
@@ -191,7 +189,9 @@ def test_a_moved_camera_and_an_edited_mesh_reach_the_gpu(render):
     quad = builders.quad("q")
     first = builders.scene(quad)
     edited = replace(first, meshes={"q": replace(quad, version=2, positions=quad.positions + np.float32([0, 0, 0.5]))})
-    moved = replace(edited, batches=(replace(first.batches[0], version=2, matrices=builders.translation(z=0.25)[None]),))
+    moved = replace(
+        edited, batches=(replace(first.batches[0], version=2, matrices=builders.translation(z=0.25)[None]),)
+    )
 
     def job(device):
         renderer = Renderer(device)

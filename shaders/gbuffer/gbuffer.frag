@@ -62,7 +62,7 @@ void main()
     vec3 normal = facing_normal();
 #endif
 #ifdef TEXTURE
-    vec4 texel = texture(base_color_texture, v_uv);
+    vec4 texel = texture(base_color_texture, v_uv, texture_lod_bias);
 #endif
 #ifdef ALPHA_TEST
     // Level 0: averaging alpha would make distant foliage vanish.

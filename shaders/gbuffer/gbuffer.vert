@@ -11,9 +11,10 @@ in vec2 in_uv;
 #ifdef ATTRIBUTE
 in vec4 in_color;
 #endif
-in vec4 in_row_0; // rows of relative-from-object
+in vec4 in_row_0; // rows of world-from-object
 in vec4 in_row_1;
 in vec4 in_row_2;
+in vec3 in_translation_low; // what float32 loses of the fourth column
 #ifdef WRITE_OBJECT_INDEX
 in int in_object_index;
 #endif
@@ -39,8 +40,11 @@ flat out uint v_object_index;
 
 void main()
 {
-    vec4 point = vec4(in_position, 1.0);
-    vec3 position = vec3(dot(in_row_0, point), dot(in_row_1, point), dot(in_row_2, point));
+    // Part by part: the high parts cancel exactly where object and camera are near each other.
+    precise vec3 high = vec3(in_row_0.w, in_row_1.w, in_row_2.w) - camera_high.xyz;
+    precise vec3 translation = high + (in_translation_low - camera_low.xyz);
+    vec3 position = vec3(dot(in_row_0.xyz, in_position), dot(in_row_1.xyz, in_position),
+                         dot(in_row_2.xyz, in_position)) + translation;
     gl_Position = clip_from_relative * vec4(position, 1.0);
     v_view_depth = dot(forward.xyz, position);
     gl_ClipDistance[0] = clip_end - v_view_depth;

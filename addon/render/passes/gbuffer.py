@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The deep G-buffer: n layers with minimum separation, by sequential peeling (the two-pass reference construction)."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from ...scene import BaseColorSource, ImageTexture, InstanceBatch, Material, Scene
 from ..device import Device
+from ..geometry import split_float64
 from ..layout import CHANNELS, GBufferChannel, outputs_glsl
 from ..plan import PlannedPass, is_alpha_tested, is_invisible
 from ..programs import ProgramSpec
@@ -21,9 +23,12 @@ GBUFFER_UNIFORMS = UniformBlock(
     (
         ("clip_from_relative", "mat4"),
         ("forward", "vec4"),
+        ("camera_high", "vec4"),  # the camera's position as two float32 parts
+        ("camera_low", "vec4"),
         ("clip_end", "float"),
         ("minimum_separation", "float"),
         ("alpha_threshold", "float"),
+        ("texture_lod_bias", "float"),
         ("layer", "int"),
     ),
 )
@@ -64,6 +69,7 @@ class GBufferPass:
         self._uniforms = UniformBuffer(device, GBUFFER_UNIFORMS)
         self._materials: moderngl.Buffer | None = None
         self._draws: list[Draw] = []
+        self._drawn: tuple[Scene, PlannedPass, float] | None = None
 
     @classmethod
     def variants(cls) -> Iterator[ProgramSpec]:
@@ -87,7 +93,14 @@ class GBufferPass:
         return sum(draw.index_count // 3 * draw.batch.count for draw in self._draws)
 
     def prepare(self, frame: Frame, planned: PlannedPass) -> None:
-        """Upload material constants and build the draw list. Draws are ordered by key, not by submission."""
+        """Upload material constants and build the draw list. Draws are ordered by key, not by submission.
+
+        A camera move brings the same scene object again, and nothing is to do.
+        """
+        drawn = (frame.scene, planned, frame.settings.alpha_threshold)
+        if self._drawn is not None and self._drawn[0] is drawn[0] and self._drawn[1:] == drawn[1:]:
+            return
+        self._drawn = drawn
         offsets = self._upload_materials(frame.scene)
         self._draws = []
         for batch in sorted(frame.scene.batches, key=lambda batch: batch.key):
@@ -129,7 +142,7 @@ class GBufferPass:
 
     def release(self) -> None:
         """Free the pass's buffers."""
-        self._draws = []
+        self._draws, self._drawn = [], None
         self._uniforms.release()
         if self._materials is not None:
             self._materials.release()
@@ -151,13 +164,18 @@ class GBufferPass:
         camera_from_relative = np.eye(4)
         camera_from_relative[:3, :3] = camera.rotation.T
         projection = camera.projection(zero_to_one_depth=self._device.zero_to_one_depth)
+        camera_high, camera_low = split_float64(camera.position)
         self._uniforms.bind(
             _FRAME_BINDING,
+            camera_high=(*camera_high, 0.0),
+            camera_low=(*camera_low, 0.0),
             clip_from_relative=projection @ camera_from_relative,
             forward=(*-camera.rotation[:, 2], 0.0),
             clip_end=camera.clip_end,
             minimum_separation=frame.settings.minimum_separation,
             alpha_threshold=frame.settings.alpha_threshold,
+            # N accumulated samples resolve √N times finer than one.
+            texture_lod_bias=-0.5 * math.log2(max(frame.settings.samples, 1)),
             layer=layer,
         )
 
