@@ -1,0 +1,7 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From Blender's evaluated scene to plain data. The only code that reads Blender's scene data."""
+
+from .camera import render_camera, viewport_camera
+from .mirror import Mirror, SyncResult
+
+__all__ = ["Mirror", "SyncResult", "render_camera", "viewport_camera"]

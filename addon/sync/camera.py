@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's cameras: the scene's own and the viewport's."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..scene import Camera
+from ..scene.arrays import Float64Array
+from .changes import Messages
+from .lights import rigid_matrix
+
+if TYPE_CHECKING:
+    import bpy
+
+
+def render_camera(depsgraph: bpy.types.Depsgraph, resolution_x: int, resolution_y: int) -> Camera | None:
+    """The scene's active camera for a full frame of this many pixels, or None where there is none.
+
+    Shift, sensor fit and the scene's pixel aspect are in the window. A panoramic or custom camera
+    is shown in perspective (`camera_messages` says so).
+    """
+    scene = depsgraph.scene_eval
+    if scene.camera is None:
+        return None
+    camera = scene.camera.evaluated_get(depsgraph)
+    if camera.type != "CAMERA":
+        return None
+    projection = _matrix(
+        camera.calc_matrix_camera(
+            depsgraph,
+            x=resolution_x,
+            y=resolution_y,
+            scale_x=scene.render.pixel_aspect_x,
+            scale_y=scene.render.pixel_aspect_y,
+        )
+    )
+    return Camera(
+        world_from_camera=rigid_matrix(_matrix(camera.matrix_world)),
+        window=_window(projection),
+        clip_start=camera.data.clip_start,
+        clip_end=camera.data.clip_end,
+        orthographic=_is_orthographic(projection),
+    )
+
+
+def camera_messages(depsgraph: bpy.types.Depsgraph, messages: Messages) -> None:
+    """Report what about the scene's camera cannot be shown."""
+    camera = depsgraph.scene_eval.camera
+    if camera is None:
+        return
+    if camera.type != "CAMERA":
+        messages.add("camera", "type", f"The scene's camera “{camera.name}” is a {camera.type.lower()}, not a camera.")
+    elif camera.data.type not in {"PERSP", "ORTHO"}:
+        kind = {"PANO": "panoramic"}.get(camera.data.type, camera.data.type.lower())
+        text = f"Camera “{camera.name}” is {kind}, which is not rendered yet; perspective is used instead."
+        messages.add("camera", "type", text)
+
+
+def viewport_camera(
+    depsgraph: bpy.types.Depsgraph,
+    space: bpy.types.SpaceView3D,
+    region: bpy.types.Region,
+    region_3d: bpy.types.RegionView3D,
+) -> Camera:
+    """The camera of a viewport: free perspective or orthographic view, or camera view with its zoom and offset.
+
+    Everything but the clip range is read off `region_3d`'s own matrices, so that what is drawn lies where Blender's
+    overlays lie. `region` gives the window's proportions where Blender has not drawn it yet.
+    """
+    projection = _matrix(region_3d.window_matrix)
+    pose = rigid_matrix(np.linalg.inv(_matrix(region_3d.view_matrix)))
+    window = _window(projection)
+    if _is_orthographic(projection):
+        return _orthographic_view(pose, projection, window)
+    clip = _clip_source(depsgraph, space, region_3d)
+    return Camera(pose, window, clip.clip_start, clip.clip_end, orthographic=False)
+
+
+def _clip_source(
+    depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView3D, region_3d: bpy.types.RegionView3D
+) -> bpy.types.Camera | bpy.types.SpaceView3D:
+    """Whoever's `clip_start` and `clip_end` hold; a projection matrix has them only roughly."""
+    if region_3d.view_perspective != "CAMERA":
+        return space
+    camera = space.camera if space.use_local_camera else depsgraph.scene_eval.camera
+    if camera is None or camera.type != "CAMERA":
+        return space
+    return camera.evaluated_get(depsgraph).data
+
+
+def _orthographic_view(pose: Float64Array, projection: Float64Array, window: tuple[float, ...]) -> Camera:
+    """Blender's free orthographic views see behind themselves too: the camera steps back to where they begin."""
+    near = (projection[2, 3] + 1.0) / projection[2, 2]
+    far = (projection[2, 3] - 1.0) / projection[2, 2]
+    back = min(near, 0.0)
+    stepped = pose.copy()
+    stepped[:3, 3] -= pose[:3, 2] * back
+    left, right, bottom, top = window
+    return Camera(stepped, (left, right, bottom, top), near - back, far - back, orthographic=True)
+
+
+def _matrix(matrix: object) -> Float64Array:
+    return np.array(matrix, np.float64)
+
+
+def _is_orthographic(projection: Float64Array) -> bool:
+    return bool(projection[3, 3] == 1.0)
+
+
+def _window(projection: Float64Array) -> tuple[float, float, float, float]:
+    """The image rectangle (left, right, bottom, top) of an OpenGL projection matrix, at view depth 1."""
+    column = 3 if _is_orthographic(projection) else 2
+    sign = -1.0 if column == 3 else 1.0
+    scale_x, scale_y = projection[0, 0], projection[1, 1]
+    shift_x, shift_y = sign * projection[0, column], sign * projection[1, column]
+    return (
+        float((shift_x - 1.0) / scale_x),
+        float((shift_x + 1.0) / scale_x),
+        float((shift_y - 1.0) / scale_y),
+        float((shift_y + 1.0) / scale_y),
+    )

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Versions, and the texts that tell the user what could not be mirrored."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable
+from dataclasses import fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+_versions = itertools.count(1)
+
+
+def new_version() -> int:
+    """A version number that this process has never used, so that an item which vanishes and returns (undo),
+    or is mirrored twice, never shows an old number with new data."""
+    return next(_versions)
+
+
+def same_array(first: NDArray[np.generic] | None, second: NDArray[np.generic] | None) -> bool:
+    """Whether two arrays (or Nones) hold the same bits: NaN equals itself, so broken data is not "changed" forever.
+
+    Compared as integers, which is also faster than as floats.
+    """
+    if first is None or second is None:
+        return first is second
+    if first is second:
+        return True
+    if first.shape != second.shape or first.dtype != second.dtype:
+        return False
+    bits = np.dtype(f"u{first.dtype.itemsize}")
+    return bool(np.array_equal(first.view(bits), second.view(bits)))
+
+
+def same_fields(first: DataclassInstance | None, second: DataclassInstance | None) -> bool:
+    """Whether two dataclass values are equal, those of their fields that are arrays included."""
+    if first is None or second is None:
+        return first is second
+    return all(
+        same_array(a, b) if isinstance(a, np.ndarray) else a == b
+        for a, b in ((getattr(first, field.name), getattr(second, field.name)) for field in fields(first))
+    )
+
+
+class Messages:
+    """Texts for the user, one per item and cause, in the order in which they were first seen."""
+
+    def __init__(self) -> None:
+        self._texts: dict[tuple[str, str], str] = {}
+        self._named: dict[str, list[str]] = {}
+
+    def add(self, item: str, cause: str, text: str) -> None:
+        """Keep `text` unless this `item` already has one for this `cause`."""
+        self._texts.setdefault((item, cause), text)
+
+    def add_named(self, cause: str, name: str) -> None:
+        """Count `name` among those for which `cause`, a sentence ending in a colon, is told once for all."""
+        names = self._named.setdefault(cause, [])
+        if name not in names:
+            names.append(name)
+
+    def extend(self, item: str, texts: Iterable[str]) -> None:
+        """Add texts that were already collected for `item`; each is its own cause."""
+        for text in texts:
+            self.add(item, text, text)
+
+    def texts(self) -> tuple[str, ...]:
+        """All texts; a list of names longer than five is cut and counted."""
+        return (*self._texts.values(), *(f"{cause} {_listed(names)}." for cause, names in self._named.items()))
+
+
+def _listed(names: list[str]) -> str:
+    shown = ", ".join(f"“{name}”" for name in names[:5])
+    return shown if len(names) <= 5 else f"{shown} and {len(names) - 5} more"

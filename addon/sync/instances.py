@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Everything the depsgraph places in the world, sorted into groups that can be drawn together.
+
+Matrices come in one call for all instances; Python only looks at which object each of them shows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..scene import InstanceBatch
+from ..scene.arrays import Float64Array, Int32Array
+from .changes import Messages, new_version, same_array
+
+if TYPE_CHECKING:
+    import bpy
+
+_FLATTEST = 1e-5
+
+
+@dataclass
+class Placements:
+    """The instances of one mesh with one assignment of materials: rows of the depsgraph's list, in its order."""
+
+    mesh: str
+    materials: tuple[str, ...]
+    rows: list[int] = field(default_factory=list)
+    object_index: list[int] = field(default_factory=list)
+    names: set[str] = field(default_factory=set)
+
+    @property
+    def key(self) -> str:
+        """Key of the batch."""
+        return "|".join((self.mesh, *self.materials))
+
+
+def read_matrices(depsgraph: bpy.types.Depsgraph) -> Float64Array:
+    """(N, 4, 4) float64 world matrices of all instances, row-major; Blender delivers them column-major."""
+    instances = depsgraph.object_instances
+    matrices = np.empty(len(instances) * 16, np.float32)
+    instances.foreach_get("matrix_world", matrices)
+    return matrices.reshape(-1, 4, 4).transpose(0, 2, 1).astype(np.float64)
+
+
+def shown_instances(depsgraph: bpy.types.Depsgraph) -> Iterator[tuple[int, bpy.types.DepsgraphObjectInstance]]:
+    """Rows and instances that are themselves visible; each is valid only until the next one is asked for.
+
+    Viewports do not show objects that are drawn as wires or bounds, as EEVEE does not.
+    """
+    shown = np.empty(len(depsgraph.object_instances), np.bool_)
+    depsgraph.object_instances.foreach_get("show_self", shown)
+    in_viewport = depsgraph.mode == "VIEWPORT"
+    for row, instance in enumerate(depsgraph.object_instances):
+        if shown[row] and not (in_viewport and instance.object.display_type in {"WIRE", "BOUNDS"}):
+            yield row, instance
+
+
+def build_batch(
+    placements: Placements, matrices: Float64Array, previous: InstanceBatch | None, messages: Messages
+) -> InstanceBatch | None:
+    """The batch of a group: `previous` itself where nothing changed, None where no instance can be drawn."""
+    own = matrices[np.array(placements.rows, np.intp)]
+    object_index = np.array(placements.object_index, np.int32)
+    usable = _repair(own, placements, messages)
+    if not usable.all():
+        own, object_index = own[usable], object_index[usable]
+    if len(own) == 0:
+        return None
+    if previous is not None and _same_batch(previous, own, object_index):
+        return previous
+    return InstanceBatch(
+        key=placements.key,
+        mesh=placements.mesh,
+        materials=placements.materials,
+        version=new_version(),
+        matrices=own,
+        object_index=object_index,
+    )
+
+
+def _same_batch(batch: InstanceBatch, matrices: Float64Array, object_index: Int32Array) -> bool:
+    return same_array(batch.matrices, matrices) and same_array(batch.object_index, object_index)
+
+
+def _repair(matrices: Float64Array, placements: Placements, messages: Messages) -> np.ndarray:
+    """(N,) which matrices can be used. One that is flat along a single direction (scale 0 on one axis) is made
+    very thin instead, in place, so that its normals stay defined."""
+    usable = np.isfinite(matrices).all(axis=(1, 2))
+    linear = np.where(usable[:, None, None], matrices[:, :3, :3], 0.0)
+    size = np.abs(linear).max(axis=(1, 2))
+    normalized = linear / np.maximum(size, 1e-30)[:, None, None]
+    suspicious = usable & (np.abs(np.linalg.det(normalized)) < _FLATTEST)
+    for row in np.flatnonzero(suspicious):
+        left, stretch, right = np.linalg.svd(normalized[row])
+        if size[row] == 0.0 or stretch[1] < _FLATTEST * stretch[0]:
+            usable[row] = False
+        elif stretch[2] < _FLATTEST * stretch[0]:
+            stretch[2] = _FLATTEST * stretch[0]
+            matrices[row, :3, :3] = (left * stretch) @ right * size[row]
+    if not usable.all():
+        name = ", ".join(f"“{name}”" for name in sorted(placements.names))
+        count = int((~usable).sum())
+        text = (
+            f"{count} instance{'s' if count > 1 else ''} of {name} with a scale of zero or a broken transform left out."
+        )
+        messages.add(placements.key, "matrix", text)
+    return usable

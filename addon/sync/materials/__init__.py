@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's materials as constants of the Principled BSDF, one base-colour texture, and warnings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from ...scene import BaseColorSource, Extension, Image, ImageTexture, Interpolation, Material
+from ...scene.arrays import Color
+from ..changes import Messages, new_version
+from ..keys import DEFAULT_MATERIAL, id_key
+from .expressions import Evaluator, Expression, luminance
+from .graph import find_output, find_source, has_nodes
+from .images import ImageTable
+from .surfaces import BLACK, Surface, evaluate_surface
+
+if TYPE_CHECKING:
+    import bpy
+
+__all__ = ["ImageTable", "MaterialTable", "evaluate_emission", "has_nodes"]
+
+
+@dataclass(frozen=True)
+class MaterialRecord:
+    """A mirrored material; `attribute` names the colour attribute it reads, None for none or the mesh's own."""
+
+    material: Material
+    attribute: str | None
+    warnings: tuple[str, ...]
+
+
+class MaterialTable:
+    """The materials in use, kept between syncs so that unchanged ones stay the same objects."""
+
+    def __init__(self) -> None:
+        self.images = ImageTable()
+        self._previous: dict[str, MaterialRecord] = {}
+        self._current: dict[str, MaterialRecord] = {}
+        self._messages = Messages()
+
+    def begin(self, updated: frozenset[str], messages: Messages) -> None:
+        """Start a sync; `updated` are keys of images that Blender says were updated."""
+        self._previous = self._current
+        self._current = {}
+        self._messages = messages
+        self.images.begin(updated, messages)
+
+    def use(self, material: bpy.types.Material | None) -> MaterialRecord:
+        """The record of a slot's material; Blender's default grey for an empty slot."""
+        key = DEFAULT_MATERIAL if material is None else id_key("material", material)
+        record = self._current.get(key)
+        if record is None:
+            record = _default() if material is None else self._read(key, material)
+            record = self._unless_equal(record)
+            self._current[key] = record
+            self._messages.extend(key, record.warnings)
+        return record
+
+    def collect(self) -> tuple[dict[str, Material], dict[str, Image]]:
+        """Materials used since `begin`, and their images, by key."""
+        materials = {key: record.material for key, record in sorted(self._current.items())}
+        textures = {material.texture.image for material in materials.values() if material.texture is not None}
+        return materials, self.images.collect(textures)
+
+    def _unless_equal(self, record: MaterialRecord) -> MaterialRecord:
+        previous = self._previous.get(record.material.key)
+        if previous is None:
+            return record
+        same = replace(record.material, version=previous.material.version) == previous.material
+        return replace(record, material=previous.material) if same else record
+
+    def _read(self, key: str, material: bpy.types.Material) -> MaterialRecord:
+        owner = f"Material “{material.name}”"
+        if not has_nodes(material):
+            return _without_nodes(key, material)
+        evaluator = Evaluator(owner, self.images)
+        output = find_output(material.node_tree, "ShaderNodeOutputMaterial")
+        if output is None or find_source(output.inputs["Surface"], ()).node is None:
+            text = f"{owner} has no surface shader connected to its output; it is shown black."
+            return MaterialRecord(_material(key, material, Surface()), None, (text,))
+        surface = evaluate_surface(output.inputs["Surface"], (), evaluator)
+        for name in ("Volume", "Displacement"):
+            if find_source(output.inputs[name], ()).node is not None:
+                evaluator.warn(output, f"{name.lower()} is not rendered yet")
+        return self._with_texture(_material(key, material, surface), surface, evaluator)
+
+    def _with_texture(self, material: Material, surface: Surface, evaluator: Evaluator) -> MaterialRecord:
+        """`material` with what its base colour and alpha read."""
+        base, alpha = surface.base_color, surface.alpha
+        if base.texture is not None and base.component != "RGB":
+            evaluator.warn(
+                base.texture, "one channel of an image as base colour is not rendered yet; all three are used"
+            )
+        if base.texture is None and alpha.texture is None:
+            source = BaseColorSource.CONSTANT if base.attribute is None else BaseColorSource.ATTRIBUTE
+            return MaterialRecord(replace(material, source=source), base.attribute or None, tuple(evaluator.warnings))
+        if base.attribute is not None and alpha.texture is not None:
+            evaluator.warn(
+                alpha.texture,
+                "alpha from an image is not rendered together with a colour attribute yet; the attribute is left out",
+            )
+        return self._textured(material, base, alpha, evaluator)
+
+    def _textured(
+        self, material: Material, base: Expression, alpha: Expression, evaluator: Evaluator
+    ) -> MaterialRecord:
+        owner = evaluator.owner
+        color = None if base.texture is None else self.images.mirror(base.texture, owner).image
+        image = color
+        if alpha.texture is not None:
+            mask = self.images.mirror(alpha.texture, owner).image
+            if color is None or mask.key != color.key or alpha.component != "ALPHA":
+                image = self.images.with_mask(color, mask, alpha.component)
+        assert image is not None
+        node = base.texture or alpha.texture
+        texture = ImageTexture(
+            image=image.key,
+            extension=Extension(node.extension),
+            interpolation=Interpolation.CLOSEST if node.interpolation == "Closest" else Interpolation.LINEAR,
+        )
+        textured = replace(
+            material, source=BaseColorSource.TEXTURE, texture=texture, texture_alpha=alpha.texture is not None
+        )
+        return MaterialRecord(textured, None, tuple(evaluator.warnings))
+
+
+def evaluate_emission(
+    owner: str, tree: bpy.types.NodeTree, output_type: str, images: ImageTable
+) -> tuple[Color, tuple[str, ...]]:
+    """The constant emission of a world's or light's node graph, and texts about what is not constant in it.
+
+    `owner` begins each text; `output_type` is the graph's kind of output node. Black where nothing is connected.
+    """
+    output = find_output(tree, output_type)
+    if output is None:
+        return BLACK, ()
+    evaluator = Evaluator(owner, images)
+    surface = evaluate_surface(output.inputs["Surface"], (), evaluator)
+    if "Volume" in output.inputs and find_source(output.inputs["Volume"], ()).node is not None:
+        evaluator.warn(output, "volume is not rendered yet")
+    return surface.emission, tuple(evaluator.warnings)
+
+
+def _default() -> MaterialRecord:
+    material = Material(key=DEFAULT_MATERIAL, name="(empty slot)", version=new_version())
+    return MaterialRecord(material, None, ())
+
+
+def _without_nodes(key: str, material: bpy.types.Material) -> MaterialRecord:
+    red, green, blue, alpha = material.diffuse_color
+    mirrored = Material(
+        key=key,
+        name=material.name,
+        version=new_version(),
+        base_color=(red, green, blue),
+        alpha=alpha,
+        metallic=material.metallic,
+        roughness=material.roughness,
+        backface_culling=material.use_backface_culling,
+    )
+    text = f"Material “{material.name}” has no nodes; its viewport colour, metallic and roughness are used instead."
+    return MaterialRecord(mirrored, None, (text,))
+
+
+def _material(key: str, material: bpy.types.Material, surface: Surface) -> Material:
+    """Everything of `surface` but its textures."""
+    return Material(
+        key=key,
+        name=material.name,
+        version=new_version(),
+        base_color=surface.base_color.factor,
+        alpha=min(max(luminance(surface.alpha.factor), 0.0), 1.0),
+        metallic=surface.metallic,
+        roughness=surface.roughness,
+        specular=surface.specular,
+        emission=surface.emission,
+        backface_culling=material.use_backface_culling,
+    )
