@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's callbacks turned into jobs: final renders, viewports, previews, and what they cost."""
+
+import atexit
+
+import bpy
+
+from ..render import stop_gl_thread
+from . import sessions, statistics, viewport
+from .engine import DeepGBufferEngine
+
+__all__ = ["DeepGBufferEngine", "register", "statistics", "unregister"]
+
+
+@bpy.app.handlers.persistent
+def _before_load(_path: str) -> None:
+    """The file is about to be replaced: nothing that was mirrored exists any more."""
+    _release()
+
+
+def _release() -> None:
+    viewport.release()
+    sessions.release()
+    statistics.clear()
+
+
+def register() -> None:
+    """Make the engine known to Blender."""
+    bpy.utils.register_class(DeepGBufferEngine)
+    bpy.app.handlers.load_pre.append(_before_load)
+    atexit.register(unregister)  # bpy 4.5 as a module does not end cleanly while a Python engine is registered
+
+
+def unregister() -> None:
+    """Free everything, stop the GL thread, and take the engine away."""
+    atexit.unregister(unregister)
+    bpy.app.handlers.load_pre.remove(_before_load)
+    _release()
+    stop_gl_thread()
+    bpy.utils.unregister_class(DeepGBufferEngine)

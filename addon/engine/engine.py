@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The engine that Blender sees. It forwards each callback to the module of its mode and reports what went wrong."""
+
+import logging
+from concurrent.futures import CancelledError
+
+import bpy
+
+from ..render import DeviceError, RenderError, ShaderError
+from . import final, layer_output, messages, passes, preview, sessions, statistics, viewport
+
+logger = logging.getLogger(__name__)
+
+
+class DeepGBufferEngine(bpy.types.RenderEngine):
+    """Blender makes one of these per frame and per viewport; what has to last longer is kept in `sessions`."""
+
+    bl_idname = statistics.ENGINE
+    bl_label = "Deep G-Buffer"
+    bl_use_preview = True
+    bl_use_eevee_viewport = True
+    bl_use_shading_nodes_custom = False
+
+    def __init__(self, *args: object, **keywords: object) -> None:
+        super().__init__(*args, **keywords)
+        self._layers: dict[str, statistics.Measured] = {}
+
+    def update_render_passes(self, scene: bpy.types.Scene, renderlayer: bpy.types.ViewLayer) -> None:
+        """Tell Blender which passes will come."""
+        passes.register(self, scene, renderlayer)
+
+    def render(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Render the view layer of `depsgraph`: F12, `blender -b`, or a preview icon."""
+        try:
+            if self.is_preview:
+                preview.render(self, depsgraph)
+            else:
+                self._render_final(depsgraph)
+        except CancelledError:
+            return
+        except (messages.EngineError, DeviceError, RenderError, ShaderError) as error:
+            self._fail(str(error))
+        except MemoryError:
+            self._fail(messages.out_of_memory(self.resolution_x, self.resolution_y))
+        except Exception as error:  # Blender would print it and show an empty picture
+            logger.exception("rendering failed")
+            self._fail(messages.internal(error))
+
+    def view_update(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+        """Something in the scene or the viewport's settings changed."""
+        viewport.update(context, depsgraph)
+
+    def view_draw(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+        """Paint the viewport."""
+        viewport.draw(self, context, depsgraph)
+
+    def _render_final(self, depsgraph: bpy.types.Depsgraph) -> None:
+        session = sessions.final(depsgraph)
+        job = final.FinalRender(self, session)
+        scene, layer_name = depsgraph.scene, depsgraph.view_layer.name
+        finished = job.run(depsgraph)
+        if layer_name in self._layers:  # Persistent Data: the same engine object renders the next frame
+            self._layers.clear()
+        self._layers[layer_name] = job.measured
+        statistics.record(scene.name, list(self._layers.values()))
+        self._warn(session, job.measured.warnings)
+        if scene.render.use_multiview:
+            self._warn(session, (messages.STEREO,))
+        if finished and job.layers:
+            self._warn(session, layer_output.save(depsgraph, job.layers))
+
+    def _warn(self, session: sessions.FinalSession, warnings: tuple[str, ...]) -> None:
+        """Report each warning; in an animation, each once."""
+        if not self.is_animation:
+            session.reported.clear()
+        for text in dict.fromkeys(warnings):
+            if text not in session.reported:
+                session.reported.add(text)
+                self.report({"WARNING"}, text)
+
+    def _fail(self, text: str) -> None:
+        """Make F12 show the error, and the operator and the command line fail."""
+        self.report({"ERROR"}, text)
+        self.error_set(text)

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A final render of one view layer: sync here, render on the GL thread, refine Blender's result as samples come in."""
+
+import time
+from concurrent.futures import CancelledError
+from contextlib import suppress
+
+import bpy
+
+from ..render import Device, LayerImages, Plan, Renderer
+from ..scene import Camera, Scene
+from ..scene.arrays import Float32Array
+from ..sync import render_camera
+from . import gl_jobs, messages, passes, regions, settings
+from .sessions import FinalSession
+from .statistics import Measured
+
+FIRST_REFRESH_SECONDS = 0.5
+"""Refreshing the picture costs a read-back, so the time to the next one doubles each time."""
+
+
+class FinalRender:
+    """One view layer of one frame on its way into Blender's render result."""
+
+    def __init__(self, engine: bpy.types.RenderEngine, session: FinalSession) -> None:
+        self.measured = Measured()
+        self.layers: tuple[LayerImages, ...] = ()
+        self._engine = engine
+        self._session = session
+        self._start = time.perf_counter()
+
+    def run(self, depsgraph: bpy.types.Depsgraph, samples: int | None = None) -> bool:
+        """Render the view layer that `depsgraph` evaluates; `measured` and `layers` are filled when it returns.
+
+        `samples` overrides the scene's number. Returns False where the user cancelled before there was a picture; a
+        render cancelled later keeps the samples it has. Raises EngineError, DeviceError, RenderError or ShaderError
+        where there can be no picture.
+        """
+        engine = self._engine
+        scene = self._sync(depsgraph)
+        camera = render_camera(depsgraph, engine.resolution_x, engine.resolution_y)
+        if camera is None:
+            raise messages.EngineError(messages.no_camera(depsgraph.scene.name))
+        result = engine.begin_result(0, 0, engine.resolution_x, engine.resolution_y, layer=depsgraph.view_layer.name)
+        finished = False
+        try:
+            wanted = passes.requested(depsgraph.view_layer)
+            channels = frozenset(item.channel for item in wanted)
+            width, height = result.resolution_x, result.resolution_y
+            camera = camera.cropped(*regions.final_border(depsgraph.scene.render, engine, width, height))
+            how = settings.final(depsgraph.scene, width, height, channels, samples)
+            with suppress(CancelledError):
+                finished = self._render(scene, camera, how, result, wanted)
+        finally:
+            engine.end_result(result, cancel=not finished)
+        self.measured.total_s = self._elapsed()
+        return finished
+
+    def _elapsed(self) -> float:
+        return time.perf_counter() - self._start
+
+    def _sync(self, depsgraph: bpy.types.Depsgraph) -> Scene:
+        self._engine.update_stats("", "Reading the scene")
+        synced = self._session.mirror.sync(depsgraph)
+        self.measured.sync_s = self._elapsed()
+        self.measured.warnings = synced.warnings
+        return synced.scene
+
+    def _render(
+        self,
+        scene: Scene,
+        camera: Camera,
+        how: settings.FinalSettings,
+        result: bpy.types.RenderResult,
+        wanted: tuple[passes.OutputPass, ...],
+    ) -> bool:
+        """Whether `result` holds a picture. Raises CancelledError where it was cancelled before the first sample."""
+        self._engine.update_stats("", "Uploading the scene")
+
+        def begin(device: Device) -> tuple[Renderer, Plan]:
+            renderer = self._session.renderer_on(device)
+            return renderer, renderer.begin(scene, camera, how.render)
+
+        renderer, plan = gl_jobs.run(begin, self._engine.test_break)
+        with suppress(CancelledError):
+            self._accumulate(renderer, how, result, wanted)
+        if not self.measured.sample_times:
+            return False
+        self._write(renderer, result, wanted)
+        self.measured.renderer = gl_jobs.finish(lambda _device: renderer.statistics())
+        self.measured.warnings += self.measured.renderer.warnings
+        if how.render.deep_output:
+            self.layers = gl_jobs.finish(lambda _device: tuple(map(renderer.read_layer, range(plan.layers))))
+        return True
+
+    def _accumulate(
+        self,
+        renderer: Renderer,
+        how: settings.FinalSettings,
+        result: bpy.types.RenderResult,
+        wanted: tuple[passes.OutputPass, ...],
+    ) -> None:
+        """Render samples until there are enough or time is up, showing some on the way."""
+
+        def sample(device: Device) -> int:
+            done = renderer.render_sample()
+            device.context.finish()
+            return done
+
+        refresh_at, interval = 0.0, FIRST_REFRESH_SECONDS
+        done, total = 0, how.render.samples
+        while done < total and not (done and how.time_limit and self._elapsed() >= how.time_limit):
+            start = time.perf_counter()
+            done = gl_jobs.run(sample, self._engine.test_break)
+            self.measured.sample_times.append(time.perf_counter() - start)
+            self._engine.update_progress(done / total)
+            self._engine.update_stats("", f"Sample {done}/{total}")
+            if done < total and self._elapsed() >= refresh_at:
+                self._write(renderer, result, wanted[:1])
+                self._engine.update_result(result)
+                refresh_at, interval = self._elapsed() + interval, 2.0 * interval
+
+    def _write(self, renderer: Renderer, result: bpy.types.RenderResult, wanted: tuple[passes.OutputPass, ...]) -> None:
+        """Put the samples so far into `result`."""
+
+        def read(_device: Device) -> dict[str, Float32Array]:
+            return {item.name: renderer.read(item.channel) for item in wanted}
+
+        passes.write(result, gl_jobs.finish(read))
+        self.measured.first_picture_s = self.measured.first_picture_s or self._elapsed()

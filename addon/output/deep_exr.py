@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The layers as a deep scanline EXR: one sample per layer and pixel, for deep compositing."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+
+from ..scene.arrays import Float32Array, Int32Array
+from .exr import top_down, write_atomically
+from .layers_exr import Layer
+
+
+def write_deep(path: Path, layers: Sequence[Layer]) -> None:
+    """Write depth Z and premultiplied RGBA (A = 1, surfaces are opaque) of every layer that is there, front to back.
+
+    A pixel has as many samples as layers that are not empty there. Raises OSError.
+    """
+    present = np.stack([top_down(np.isfinite(layer.depth)) for layer in layers], axis=-1)
+    counts = present.sum(axis=-1, dtype=np.int32)
+    planes: dict[str, list[Float32Array]] = {"Z": [layer.depth for layer in layers]}
+    planes |= {letter: [layer.radiance[..., index] for layer in layers] for index, letter in enumerate("RGB")}
+    planes["A"] = [np.ones_like(layer.depth) for layer in layers]
+    channels = {
+        name: _per_pixel(np.stack([top_down(image) for image in images], axis=-1)[present], counts)
+        for name, images in planes.items()
+    }
+    header = {"type": OpenEXR.deepscanline, "compression": OpenEXR.ZIPS_COMPRESSION}
+    write_atomically(path, header, channels)
+
+
+def _per_pixel(samples: Float32Array, counts: Int32Array) -> np.ndarray:
+    """(H, W) object array of each pixel's samples (count,) float32, None where there are none, as OpenEXR takes it.
+
+    `samples` holds all pixels' samples one after another, in C order of `counts` (H, W).
+    """
+    samples = samples.astype(np.float32, copy=False)
+    ends = np.cumsum(counts, axis=None)
+    pixels = np.empty(counts.size, dtype=object)
+    starts = (ends - counts.ravel()).tolist()
+    pixels[:] = [
+        samples[first:last] if last > first else None for first, last in zip(starts, ends.tolist(), strict=True)
+    ]
+    return pixels.reshape(counts.shape)

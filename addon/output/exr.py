@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the EXR writers share."""
+
+import os
+from pathlib import Path
+from typing import Any
+
+import OpenEXR
+
+from ..scene.arrays import Float32Array
+
+
+def write_atomically(path: Path, header: dict[str, Any], channels: dict[str, Any]) -> None:
+    """Write an EXR under a temporary name beside `path`, then rename it: a reader never sees half a file.
+
+    Makes the folder. `channels` are row 0 at the top. Raises OSError naming the path where the file cannot be written.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    try:
+        with OpenEXR.File(header, channels) as file:
+            file.write(str(temporary))
+        temporary.replace(path)
+    except RuntimeError as error:  # OpenEXR's only exception
+        raise OSError(f"OpenEXR could not write {path}: {error}") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def top_down(image: Float32Array) -> Float32Array:
+    """An image whose row 0 is at the bottom, as EXR stores it."""
+    return image[::-1]

@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings, panels, operators and presets."""
+
+from pathlib import Path
+
+import bpy
+
+from . import operators, panels, properties, standard_panels
+
+_CLASSES = (*operators.CLASSES, *panels.CLASSES)
+_PRESET_ROOT = str(Path(__file__).parent)
+
+
+def register() -> None:
+    """Add everything to Blender's user interface."""
+    properties.register()
+    for cls in _CLASSES:
+        bpy.utils.register_class(cls)
+    bpy.utils.register_preset_path(_PRESET_ROOT)
+    standard_panels.register()
+
+
+def unregister() -> None:
+    """Take everything away again."""
+    standard_panels.unregister()
+    bpy.utils.unregister_preset_path(_PRESET_ROOT)
+    for cls in reversed(_CLASSES):
+        bpy.utils.unregister_class(cls)
+    properties.unregister()

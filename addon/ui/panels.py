@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The engine's own panels."""
+
+from typing import ClassVar
+
+import bpy
+from bl_ui.utils import PresetPanel
+
+from ..engine import passes, statistics
+from .operators import PRESET_FOLDER, DEEP_GBUFFER_OT_copy_statistics, DEEP_GBUFFER_OT_sampling_preset_add
+
+
+class _EnginePanel:
+    """A panel of the Properties editor that only our engine shows."""
+
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "render"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether the scene renders with our engine."""
+        return context.engine == statistics.ENGINE
+
+    def _column(self) -> bpy.types.UILayout:
+        """A column in Blender's usual two-column style."""
+        self.layout.use_property_split = True
+        self.layout.use_property_decorate = False
+        return self.layout.column()
+
+
+class DEEP_GBUFFER_PT_sampling_presets(PresetPanel, bpy.types.Panel):
+    """Presets of the Sampling panel."""
+
+    bl_label = "Sampling Presets"
+    preset_subdir = PRESET_FOLDER
+    preset_operator = "script.execute_preset"
+    preset_add_operator = DEEP_GBUFFER_OT_sampling_preset_add.bl_idname
+
+
+class DEEP_GBUFFER_PT_sampling(_EnginePanel, bpy.types.Panel):
+    """Samples of the final render and of viewports."""
+
+    bl_label = "Sampling"
+
+    def draw_header_preset(self, _context: bpy.types.Context) -> None:
+        """The presets menu."""
+        DEEP_GBUFFER_PT_sampling_presets.draw_panel_header(self.layout)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Samples, time, seed."""
+        settings = context.scene.deep_gbuffer
+        column = self._column()
+        samples = column.column(align=True)
+        samples.prop(settings, "samples", text="Render")
+        samples.prop(settings, "viewport_samples", text="Viewport")
+        column.prop(settings, "time_limit")
+        column.prop(settings, "seed")
+
+
+class DEEP_GBUFFER_PT_layers(_EnginePanel, bpy.types.Panel):
+    """The deep G-buffer itself."""
+
+    bl_label = "Deep G-Buffer"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Layers and their separation."""
+        settings = context.scene.deep_gbuffer
+        column = self._column()
+        column.prop(settings, "layers")
+        separation = column.column()
+        separation.active = settings.layers > 1
+        separation.prop(settings, "minimum_separation")
+
+
+class DEEP_GBUFFER_PT_film(_EnginePanel, bpy.types.Panel):
+    """Pixel filter and background."""
+
+    bl_label = "Film"
+    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Blender's own film settings."""
+        column = self._column()
+        column.prop(context.scene.render, "filter_size")
+        column.prop(context.scene.render, "film_transparent", text="Transparent")
+
+
+class DEEP_GBUFFER_PT_debug_view(_EnginePanel, bpy.types.Panel):
+    """One channel of the deep G-buffer instead of the picture."""
+
+    bl_label = "Debug View"
+    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Channel and layer."""
+        settings = context.scene.deep_gbuffer
+        column = self._column()
+        column.prop(settings, "debug_view", text="Channel")
+        layer = column.column()
+        layer.active = settings.debug_view != "NONE"
+        layer.prop(settings, "debug_layer")
+
+
+class DEEP_GBUFFER_PT_layer_output(_EnginePanel, bpy.types.Panel):
+    """Files with every layer."""
+
+    bl_label = "Layer Output"
+    bl_context = "output"
+    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Which files, and where."""
+        settings = context.scene.deep_gbuffer
+        column = self._column()
+        column.prop(settings, "save_layers")
+        column.prop(settings, "save_deep")
+        path = column.column()
+        path.active = settings.save_layers or settings.save_deep
+        path.prop(settings, "layers_path", text="Path")
+
+
+class DEEP_GBUFFER_PT_view_layer_passes(_EnginePanel, bpy.types.Panel):
+    """The passes that the engine delivers."""
+
+    bl_label = "Passes"
+    bl_context = "view_layer"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """One box per pass of the table."""
+        column = self._column()
+        for item in passes.PASSES:
+            if item.flag:
+                column.prop(context.view_layer, item.flag, text=item.names[-1])
+
+
+class DEEP_GBUFFER_PT_statistics(_EnginePanel, bpy.types.Panel):
+    """What the last final render did and cost."""
+
+    bl_label = "Statistics"
+    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Times, passes, passes left out with the reason, and memory."""
+        last = statistics.last(context.scene.name)
+        if last is None:
+            self.layout.label(text="No final render yet.")
+            return
+        _table(self.layout, "Time", [(label, f"{last[key]:.3f} s") for key, label in TIMES])
+        _table(self.layout, "Passes (last sample)", [(item["name"], f"{item['ms']:.2f} ms") for item in last["passes"]])
+        _table(self.layout, "Left out", [(item["name"], item["reason"]) for item in last["left_out"]])
+        _table(self.layout, "Memory", [(name, f"{size / 2**20:.1f} MiB") for name, size in last["bytes"].items()])
+        counts = [(key.capitalize(), f"{last[key]:,}") for key in ("samples", "triangles", "draws", "instances")]
+        _table(self.layout, "Scene", [*counts, ("Device", last["device"])])
+        self.layout.operator(DEEP_GBUFFER_OT_copy_statistics.bl_idname, icon="COPYDOWN")
+
+
+TIMES = (
+    ("sync_s", "Reading the scene"),
+    ("upload_s", "Upload"),
+    ("first_picture_s", "First picture"),
+    ("sample_s", "One sample"),
+    ("total_s", "Total"),
+)
+
+
+def _table(layout: bpy.types.UILayout, title: str, rows: list[tuple[str, str]]) -> None:
+    if not rows:
+        return
+    box = layout.box().column(align=True)
+    box.label(text=title)
+    for name, value in rows:
+        row = box.split(factor=0.4)
+        row.label(text=name)
+        row.label(text=value)
+
+
+CLASSES = (
+    DEEP_GBUFFER_PT_sampling_presets,
+    DEEP_GBUFFER_PT_sampling,
+    DEEP_GBUFFER_PT_layers,
+    DEEP_GBUFFER_PT_film,
+    DEEP_GBUFFER_PT_debug_view,
+    DEEP_GBUFFER_PT_statistics,
+    DEEP_GBUFFER_PT_layer_output,
+    DEEP_GBUFFER_PT_view_layer_passes,
+)

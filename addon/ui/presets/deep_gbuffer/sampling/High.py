@@ -1,0 +1,7 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import bpy
+
+settings = bpy.context.scene.deep_gbuffer
+settings.samples = 64
+settings.viewport_samples = 32
+settings.time_limit = 0.0

@@ -1,0 +1,7 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import bpy
+
+settings = bpy.context.scene.deep_gbuffer
+settings.samples = 16
+settings.viewport_samples = 16
+settings.time_limit = 0.0

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The scene's settings of the engine: `Scene.deep_gbuffer`."""
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+
+from ..engine import viewport
+from ..scene import DebugView
+from ..scene.settings import MAXIMUM_LAYERS
+
+DEBUG_ITEMS = [
+    (DebugView.NONE.value, "Rendered", "The finished picture"),
+    (DebugView.DEPTH.value, "Depth", "Distance from the camera plane"),
+    (DebugView.NORMAL.value, "Normal", "World-space shading normal"),
+    (DebugView.ALBEDO.value, "Albedo", "Base color of the surface"),
+    (DebugView.METALLIC.value, "Metallic", "How metallic the surface is"),
+    (DebugView.ROUGHNESS.value, "Roughness", "Perceptual roughness of the surface"),
+    (DebugView.EMISSION.value, "Emission", "Radiance that the surface itself emits"),
+    (DebugView.OBJECT_INDEX.value, "Object Index", "Pass index of the object"),
+    (DebugView.DIRECT.value, "Direct Light", "Light that reaches the layer straight from lights and world"),
+]
+
+
+def _changed(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    """Scripts that set a property cause no redraw by themselves."""
+    viewport.redraw()
+
+
+class DeepGBufferSettings(bpy.types.PropertyGroup):
+    """Settings of the Deep G-Buffer engine."""
+
+    samples: IntProperty(
+        name="Render Samples",
+        description="Samples per pixel of the final render: more give smoother edges, lights and indirect light",
+        default=16,
+        min=1,
+        soft_max=256,
+        max=65536,
+    )
+    viewport_samples: IntProperty(
+        name="Viewport Samples",
+        description="Samples per pixel after which a viewport stops refining",
+        default=16,
+        min=1,
+        soft_max=256,
+        max=65536,
+        update=_changed,
+    )
+    time_limit: FloatProperty(
+        name="Time Limit",
+        description="Stop the final render of a view layer after this time with the samples it has; 0 for no limit",
+        default=0.0,
+        min=0.0,
+        soft_max=60.0,
+        max=86400.0,
+        step=100,
+        unit="TIME_ABSOLUTE",
+    )
+    seed: IntProperty(
+        name="Seed",
+        description="Changes every sampling pattern; equal seeds give equal pictures",
+        default=0,
+        min=0,
+        max=2**31 - 1,
+        update=_changed,
+    )
+    layers: IntProperty(
+        name="Layers",
+        description="Surfaces behind one another that the deep G-buffer keeps per pixel",
+        default=2,
+        min=1,
+        max=MAXIMUM_LAYERS,
+        update=_changed,
+    )
+    minimum_separation: FloatProperty(
+        name="Minimum Separation",
+        description="Least distance along the view between a layer and the next: closer surfaces are skipped, so that "
+        "layers hold what is really hidden instead of details right behind a surface",
+        default=0.5,
+        min=0.0,
+        soft_max=10.0,
+        precision=3,
+        subtype="DISTANCE",
+        update=_changed,
+    )
+    debug_view: EnumProperty(
+        name="Debug View",
+        description="Show one channel of the deep G-buffer instead of the picture, in viewports and final renders",
+        items=DEBUG_ITEMS,
+        default=DebugView.NONE.value,
+        update=_changed,
+    )
+    debug_layer: IntProperty(
+        name="Layer",
+        description="Layer of the deep G-buffer that the debug view shows, 1 being the nearest",
+        default=1,
+        min=1,
+        max=MAXIMUM_LAYERS,
+        update=_changed,
+    )
+    save_layers: BoolProperty(
+        name="Multi-Layer EXR",
+        description="Write every channel of every layer to a multi-layer OpenEXR file after a final render",
+        default=False,
+    )
+    save_deep: BoolProperty(
+        name="Deep EXR",
+        description="Write depth and color of every layer to a deep OpenEXR file after a final render, one sample "
+        "per layer and pixel, for deep compositing",
+        default=False,
+    )
+    layers_path: StringProperty(
+        name="Layer Output Path",
+        description="Where layer files are written. # stands for a digit of the frame number, // for the folder of "
+        "the .blend; a folder takes the .blend's name",
+        default="//",
+        subtype="FILE_PATH",
+    )
+
+
+def register() -> None:
+    """Give scenes their settings."""
+    bpy.utils.register_class(DeepGBufferSettings)
+    bpy.types.Scene.deep_gbuffer = bpy.props.PointerProperty(type=DeepGBufferSettings)
+
+
+def unregister() -> None:
+    """Take the settings away."""
+    del bpy.types.Scene.deep_gbuffer
+    bpy.utils.unregister_class(DeepGBufferSettings)
