@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Virtual environments with pinned, hashed packages, made on first use and kept in the cache."""
+
+from __future__ import annotations
+
+import os
+import platform
+from dataclasses import dataclass
+from pathlib import Path
+
+from tooling import places, pythons, system_packages
+from tooling.console import ToolError, run_long
+
+
+@dataclass(frozen=True)
+class Blender:
+    """A Blender release that exists as a Python module; `version` also names its lock file."""
+
+    version: str
+    python: tuple[int, int]
+
+    @property
+    def python_text(self) -> str:
+        """Its Python version, as people write it."""
+        return f"{self.python[0]}.{self.python[1]}"
+
+
+BLENDERS = (Blender("5.2", (3, 13)), Blender("4.5", (3, 11)))  # newest first
+DEVELOPMENT_PYTHONS = ((3, 11), (3, 13), (3, 12), (3, 14))
+
+
+def executable(environment: Path) -> Path:
+    """The interpreter of a virtual environment."""
+    return environment / "Scripts" / "python.exe" if os.name == "nt" else environment / "bin" / "python"
+
+
+def available() -> list[Blender]:
+    """The Blender releases whose Python is on this machine, newest first."""
+    return [blender for blender in BLENDERS if pythons.find(*blender.python)]
+
+
+def missing_python(blenders: list[Blender]) -> str:
+    """One line: which Python is missing for these releases, and how to get it."""
+    versions = " or ".join(blender.python_text for blender in blenders)
+    releases = " or ".join(blender.version for blender in blenders)
+    return (
+        f"Blender {releases} needs Python {versions}, which was not found here: "
+        f"`uv python install {blenders[0].python_text}` provides one (uv: `pip install uv`)."
+    )
+
+
+def blender_python(version: str | None = None) -> Path:
+    """The interpreter in which `import bpy` gives Blender `version` (None: the newest that can be had), set up.
+
+    Raises ToolError where its Python or a system library is missing and cannot be installed.
+    """
+    wanted = [blender for blender in BLENDERS if version in {None, blender.version}]
+    for blender in wanted:
+        interpreter = pythons.find(*blender.python)
+        if interpreter:
+            system_packages.provide(system_packages.BLENDER_LIBRARIES)
+            return _provide(f"blender-{blender.version}", interpreter)
+    raise ToolError(missing_python(wanted))
+
+
+def development_python() -> Path:
+    """The interpreter with ruff, pyright, import-linter and type stubs, set up. Raises ToolError like the above."""
+    for version in DEVELOPMENT_PYTHONS:
+        interpreter = pythons.find(*version)
+        if interpreter:
+            return _provide("development", interpreter)
+    raise ToolError(
+        "The development tools need Python 3.11 or newer, which was not found here: "
+        "`uv python install 3.13` provides one (uv: `pip install uv`)."
+    )
+
+
+def _provide(name: str, interpreter: pythons.Interpreter) -> Path:
+    """Interpreter of the environment for the lock file `name`.txt. Environments are never changed, only made anew."""
+    lock_file = places.REQUIREMENTS / f"{name}.txt"
+    version = ".".join(str(number) for number in interpreter.version)
+    identity = places.key(lock_file.read_bytes(), version, str(interpreter.path.resolve()), platform.machine())
+
+    def make(folder: Path) -> None:
+        _create(folder, interpreter)
+        command = [executable(folder), "-m", "pip", "install", "--disable-pip-version-check", "--no-input"]
+        command += ["--no-deps", "--only-binary", ":all:", "--require-hashes", "-r", lock_file]
+        run_long(command, f"Setting up the {name} environment (once)")
+
+    place = places.cached(f"environments/{name}-{identity}", lambda folder: executable(folder).exists(), make)
+    return executable(place)
+
+
+def _create(folder: Path, interpreter: pythons.Interpreter) -> None:
+    """Make an empty virtual environment with pip; on Debian install the package that can, first."""
+    if not interpreter.has_venv:
+        package = f"python{interpreter.version[0]}.{interpreter.version[1]}-venv"
+        if not system_packages.can_install():
+            raise ToolError(
+                f"{interpreter.path} cannot make virtual environments: install with `sudo apt-get install {package}`."
+            )
+        system_packages.install([package])
+    run_long([interpreter.path, "-m", "venv", folder], "Making a virtual environment")

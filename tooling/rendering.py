@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`build.py render`: start a Blender with the job, show what it says, put its pictures in place."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+from argparse import Namespace
+from collections import deque
+from pathlib import Path
+from typing import Any
+
+from tooling import environments, packaging, places
+from tooling.console import INTERRUPTED, TAIL_LINES, Progress, ToolError, say, stop, warn
+
+JOB = places.REPOSITORY / "tooling" / "render_job.py"
+MARK = "\x1edeep-gbuffer "
+SUFFIXES = (".png", ".exr")
+FRAME_DIGITS = 4
+ANY_WRITE_BIT = 0o222
+
+
+def numbered(output: Path, frame: int) -> Path:
+    """`output` with the frame number in its name as Blender puts it: in place of the #s, else after the stem."""
+    hashes = list(re.finditer("#+", output.name))
+    if hashes:
+        start, end = hashes[-1].span()
+        return output.with_name(output.name[:start] + _digits(frame, end - start) + output.name[end:])
+    return output.with_name(output.stem + _digits(frame, FRAME_DIGITS) + output.suffix)
+
+
+def _digits(frame: int, width: int) -> str:
+    """The frame number filled up with zeros to `width` digits, the sign before them."""
+    return f"{'-' if frame < 0 else ''}{abs(frame):0{width}d}"
+
+
+def default_output(blend: Path, engine: str) -> Path:
+    """Where the picture goes without -o: beside the .blend, or into the current folder where that cannot be written."""
+    folder = blend.parent if is_writable(blend.parent) else Path.cwd()
+    return folder / f"{blend.stem}_{engine.lower()}.png"
+
+
+def is_writable(folder: Path) -> bool:
+    """Whether files may be made in `folder`: root, too, keeps out of one that is marked read-only for everybody."""
+    return bool(folder.stat().st_mode & ANY_WRITE_BIT) and os.access(folder, os.W_OK)
+
+
+def check_output(output: Path) -> None:
+    """Raise ToolError where `output` has another suffix than ours or its folder cannot be written."""
+    if output.suffix not in SUFFIXES:
+        raise ToolError(f"{output}: the picture is written as .png or .exr.")
+    if not output.parent.is_dir() or not is_writable(output.parent):
+        raise ToolError(f"{output.parent} is not a folder that can be written.")
+
+
+def blender_command(choice: str | None) -> tuple[list[str], bool]:
+    """The command that runs a Python script inside the chosen Blender, and whether that is a real Blender."""
+    if choice is None or choice in {blender.version for blender in environments.BLENDERS}:
+        return [str(environments.blender_python(choice)), "-P", str(JOB), "--"], False
+    path = shutil.which(choice)
+    if path is None:
+        versions = ", ".join(blender.version for blender in environments.BLENDERS)
+        raise ToolError(f"--blender {choice}: neither a version ({versions}) nor a program.")
+    return [path, "--background", "--python-exit-code", "1", "--python", str(JOB), "--"], True
+
+
+def render(options: Namespace) -> int:
+    """Run the verb with the parsed command line; the exit code. Raises ToolError with the reason of any failure."""
+    blend = Path(options.file).resolve()
+    if not blend.is_file():
+        raise ToolError(f"{options.file}: no such file.")
+    output = Path(options.output).resolve() if options.output else default_output(blend, options.engine)
+    check_output(output)
+    if options.stats and not Path(options.stats).resolve().parent.is_dir():
+        raise ToolError(f"{options.stats}: its folder does not exist.")
+    command, real = blender_command(options.blender)
+    with tempfile.TemporaryDirectory(prefix="deep_gbuffer_") as scratch:
+        extension = None
+        if real and options.engine == "DEEP_GBUFFER":
+            extension = str(packaging.for_this_machine(Path(scratch) / "extension"))
+        frames = options.frames or ([options.frame] if options.frame is not None else None)
+        job = {
+            "file": str(blend),
+            "engine": options.engine,
+            "frames": frames,
+            "resolution": options.resolution,
+            "samples": options.samples,
+            "time_limit": options.time_limit,
+            "set": options.set,
+            "repeat": options.repeat,
+            "suffix": output.suffix,
+            "scratch": scratch,
+            "extension": extension,
+        }
+        run = Run(output, numbers=options.frames is not None)
+        run.execute([*command, json.dumps(job)], Path(scratch))
+    if options.stats:
+        Path(options.stats).write_text(json.dumps(run.statistics, indent=1) + "\n", encoding="utf-8")
+    return 0
+
+
+class Run:
+    """One Blender at work: follows its output and takes its pictures."""
+
+    def __init__(self, output: Path, numbers: bool) -> None:
+        """Pictures go to `output`, with frame numbers in the name where `numbers`."""
+        self.statistics: list[dict[str, Any]] = []
+        self._output = output
+        self._numbers = numbers
+        self._error: str | None = None
+        self._pictures = 0
+        self._progress = Progress("Rendering")
+
+    def execute(self, command: list[str], scratch: Path) -> None:
+        """Run Blender to its end. Raises ToolError with what Blender said when it fails.
+
+        A KeyboardInterrupt ends Blender first; its temporary files and profile are inside `scratch`.
+        """
+        profile = scratch / "profile"
+        profile.mkdir()
+        child = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="replace",
+            env={**os.environ, "BLENDER_USER_RESOURCES": str(profile), "TMPDIR": str(scratch), "TEMP": str(scratch)},
+            start_new_session=True,
+        )
+        tail: deque[str] = deque(maxlen=TAIL_LINES)
+        try:
+            for line in child.stdout or ():
+                before, found, message = line.partition(MARK)
+                if found:
+                    self._take(json.loads(message))
+                elif before.strip():
+                    tail.append(before)
+            child.wait()
+        finally:
+            self._progress.clear()
+            stop(child)
+        if child.returncode == INTERRUPTED:
+            raise KeyboardInterrupt
+        if self._error is not None:
+            raise ToolError(self._error)
+        if child.returncode != 0 or not self._pictures:
+            ending = f"signal {-child.returncode}" if child.returncode < 0 else f"exit code {child.returncode}"
+            raise ToolError(f"Blender ended without a picture ({ending}); it last said:\n{''.join(tail)}".rstrip())
+
+    def _take(self, message: dict[str, Any]) -> None:
+        """Act on one message of the job."""
+        kind, content = message["kind"], message["content"]
+        if kind == "progress":
+            self._progress.show(content)
+        elif kind == "error":
+            self._error = content
+        elif kind == "statistics":
+            self.statistics = content
+            for warning in dict.fromkeys(text for entry in content for text in entry["warnings"]):
+                warn(f"warning: {warning}")
+        elif kind == "picture":
+            target = numbered(self._output, content["frame"]) if self._numbers else self._output
+            put_in_place(Path(content["path"]), target)
+            self._pictures += 1
+            self._progress.clear()
+            say(f"wrote {target}")
+
+
+def put_in_place(source: Path, target: Path) -> None:
+    """Move a finished file to `target` so that `target` is never half a file. Raises ToolError where it cannot be."""
+    draft = target.with_name(f".{target.name}.{os.getpid()}")
+    try:
+        shutil.copyfile(source, draft)
+        draft.replace(target)
+    except OSError as error:
+        raise ToolError(f"{target} could not be written: {error.strerror}.") from error
+    finally:
+        draft.unlink(missing_ok=True)
+    source.unlink()
