@@ -7,6 +7,8 @@ import numpy as np
 from ..scene import Channel
 from ..scene.arrays import Float32Array
 from .device import Device
+from .plan import film_target
+from .targets import TexturePool
 
 CHANNEL_COMPONENTS = {
     Channel.COMBINED: 4,
@@ -33,8 +35,8 @@ class Film:
         self._context.enable_only(moderngl.BLEND)
         self._context.blend_func = moderngl.ONE, moderngl.ONE
 
-    def mean(self, texture: moderngl.TextureArray, channel: Channel) -> Float32Array:
+    def mean(self, pool: TexturePool, channel: Channel) -> Float32Array:
         """The mean over the samples so far, (H, W, C) float32, row 0 at the bottom."""
-        width, height, _ = texture.size
-        sums = np.frombuffer(texture.read(), np.float32).reshape(height, width, 4)
+        width, height = pool.size
+        sums = np.frombuffer(pool.read(film_target(channel).name), np.float32).reshape(height, width, 4)
         return sums[..., : CHANNEL_COMPONENTS[channel]] / np.float32(max(self.samples, 1))

@@ -39,7 +39,7 @@ def read_target(pool: TexturePool, name: str) -> Float32Array:
     texture = pool.texture(name)
     width, height, layers = texture.size
     dtype = _NUMPY_TYPES[texture.dtype]
-    values = np.frombuffer(texture.read(alignment=1), dtype).reshape(layers, height, width, texture.components)
+    values = np.frombuffer(pool.read(name), dtype).reshape(layers, height, width, texture.components)
     if texture.dtype in ("f1", "nu2"):
         return values.astype(np.float32) / np.float32(np.iinfo(dtype).max)
     return values.astype(np.float32)

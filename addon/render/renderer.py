@@ -91,7 +91,7 @@ class Renderer:
             raise RuntimeError("no sample has been rendered yet")
         if channel in FIRST_SAMPLE_CHANNELS:
             return self._first_sample[channel]
-        return self._film.mean(self._pool.texture(f"film.{channel.value.lower()}"), channel)
+        return self._film.mean(self._pool, channel)
 
     def read_layer(self, layer: int) -> LayerImages:
         """One layer of sample 0's deep G-buffer. Raises IndexError where the settings had no `deep_output`."""

@@ -64,6 +64,15 @@ class TexturePool:
         """The texture array of a target."""
         return self._textures[name]
 
+    def read(self, name: str) -> bytes:
+        """A target's texels, tightly packed, layer after layer.
+
+        Waits for the GPU first: llvmpipe (Mesa 22.3) does not notice that a texture which is no longer attached is
+        still being drawn, and hands out the picture before.
+        """
+        self._device.context.finish()
+        return self._textures[name].read(alignment=1)
+
     def framebuffer(self, names: tuple[str, ...], layer: int, *, depth: bool = False) -> moderngl.Framebuffer:
         """A framebuffer that draws into one layer of the named targets, with the shared depth buffer on request."""
         key = (names, layer, depth)
