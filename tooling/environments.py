@@ -26,7 +26,7 @@ class Blender:
 
 
 BLENDERS = (Blender("5.2", (3, 13)), Blender("4.5", (3, 11)))  # newest first
-DEVELOPMENT_PYTHONS = ((3, 11), (3, 13), (3, 12), (3, 14))
+MODERN_PYTHONS = ((3, 11), (3, 13), (3, 12), (3, 14))
 
 
 def executable(environment: Path) -> Path:
@@ -64,13 +64,23 @@ def blender_python(version: str | None = None) -> Path:
 
 
 def development_python() -> Path:
-    """The interpreter with ruff, pyright, import-linter and type stubs, set up. Raises ToolError like the above."""
-    for version in DEVELOPMENT_PYTHONS:
+    """The interpreter with ruff, pyright, import-linter and type stubs, set up. Raises ToolError without a Python."""
+    return _any_python("development")
+
+
+def runtime_python() -> Path:
+    """An interpreter with what the extension bundles, and pip to download it. Raises ToolError without a Python."""
+    return _any_python("runtime")
+
+
+def _any_python(name: str) -> Path:
+    """Interpreter of the environment `name`, which works with every Python in MODERN_PYTHONS."""
+    for version in MODERN_PYTHONS:
         interpreter = pythons.find(*version)
         if interpreter:
-            return _provide("development", interpreter)
+            return _provide(name, interpreter)
     raise ToolError(
-        "The development tools need Python 3.11 or newer, which was not found here: "
+        f"The {name} environment needs Python 3.11 or newer, which was not found here: "
         "`uv python install 3.13` provides one (uv: `pip install uv`)."
     )
 

@@ -27,57 +27,61 @@ PYTHONS = ("3.11", "3.13", "3.14")  # Blender 4.5, 5.x, and 5.x as distributions
 
 def package(options: Namespace) -> int:
     """Run the verb: one zip per platform in `options.output`; the exit code."""
-    zips = build(Path(options.output).resolve(), PLATFORMS)
+    zips = build(Path(options.output).resolve(), PLATFORMS, extension_tool())
     for path in zips:
         say(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB)")
     return 0
 
 
-def for_this_machine(folder: Path) -> Path:
-    """The zip for the platform this runs on, built into `folder`. Raises ToolError on a platform without wheels."""
+def for_this_machine(folder: Path, tool: list[str]) -> Path:
+    """The zip for the platform this runs on, like `build`. Raises ToolError on a platform without wheels."""
     name = {"linux": "linux", "win32": "windows", "darwin": "macos"}.get(sys.platform, sys.platform)
     machine = {"x86_64": "x64", "amd64": "x64"}.get(platform.machine().lower(), platform.machine().lower())
     if f"{name}-{machine}" not in PLATFORMS:
         raise ToolError(f"The extension is not built for {name}-{machine}, only for {', '.join(PLATFORMS)}.")
-    return build(folder, [f"{name}-{machine}"])[0]
+    return build(folder, [f"{name}-{machine}"], tool)[0]
 
 
-def build(folder: Path, platforms: Iterable[str]) -> list[Path]:
-    """Build and validate the zips of `platforms` (keys of PLATFORMS) into `folder`, made when missing.
+def extension_tool() -> list[str]:
+    """The command of Blender's extension tool, the one inside the newest bpy module."""
+    python = environments.blender_python()
+    found = sorted(python.parent.parent.glob("[lL]ib/**/bl_pkg/cli/blender_ext.py"))
+    if not found:
+        raise ToolError(f"{python.parent.parent} has no blender_ext.py: delete that folder, it is made again.")
+    return [str(python), str(found[-1])]
+
+
+def extension_tool_of(blender: str) -> list[str]:
+    """The same tool as a command of a real Blender."""
+    return [blender, "--command", "extension"]
+
+
+def build(folder: Path, platforms: Iterable[str], tool: list[str]) -> list[Path]:
+    """Build and validate the zips of `platforms` (keys of PLATFORMS) with `tool` into `folder`, made when missing.
 
     Raises ToolError with the output of Blender's tool where it refuses one.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    python = environments.blender_python()
-    tool = extension_tool(python)
     with tempfile.TemporaryDirectory(prefix="deep_gbuffer_package_") as scratch:
-        staged = stage(Path(scratch) / "deep_gbuffer", python, list(platforms))
+        staged = stage(Path(scratch) / "deep_gbuffer", list(platforms))
         built = Path(scratch) / "built"
         built.mkdir()
         arguments = ["build", "--source-dir", staged, "--output-dir", built, "--split-platforms"]
-        run_long([python, tool, *arguments], "Building the extension")
+        run_long([*tool, *arguments], "Building the extension")
         zips = sorted(built.glob("*.zip"))
         for path in zips:
-            run_long([python, tool, "validate", path], f"Validating {path.name}")
+            run_long([*tool, "validate", path], f"Validating {path.name}")
         return [Path(shutil.move(str(path), str(folder / path.name))) for path in zips]
 
 
-def extension_tool(python: Path) -> Path:
-    """Blender's command-line tool for extensions, inside the bpy module of this environment."""
-    found = sorted(python.parent.parent.glob("[lL]ib/**/bl_pkg/cli/blender_ext.py"))
-    if not found:
-        raise ToolError(f"{python.parent.parent} has no blender_ext.py: delete that folder, it is made again.")
-    return found[-1]
-
-
-def stage(folder: Path, python: Path, platforms: list[str]) -> Path:
+def stage(folder: Path, platforms: list[str]) -> Path:
     """Lay out the extension for `platforms` in `folder`: the add-on, the shaders, the wheels and the full manifest."""
     shutil.copytree(ADD_ON, folder, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copytree(SHADERS, folder / "shaders")
     (folder / "wheels").mkdir()
     names: list[str] = []
     for name in platforms:
-        for wheel in sorted(wheels(name, python).glob("*.whl")):
+        for wheel in sorted(wheels(name).glob("*.whl")):
             shutil.copy(wheel, folder / "wheels")
             names.append(wheel.name)
     manifest = folder / "blender_manifest.toml"
@@ -95,12 +99,13 @@ def complete_manifest(manifest: str, platforms: list[str], names: list[str]) -> 
     return "\n".join([*lines[:first_table], *wheel_list, *lines[first_table:]]) + "\n"
 
 
-def wheels(name: str, python: Path) -> Path:
+def wheels(name: str) -> Path:
     """A folder with the wheels of platform `name` for every Python in PYTHONS, downloaded once, checked by hash."""
     lock_file = places.REQUIREMENTS / "runtime.txt"
     identity = places.key(lock_file.read_bytes(), *PYTHONS, *PLATFORMS[name])
 
     def download(folder: Path) -> None:
+        python = environments.runtime_python()
         common = ["download", "--disable-pip-version-check", "--no-input", "--no-deps", "--only-binary", ":all:"]
         tags = [part for tag in PLATFORMS[name] for part in ("--platform", tag)]
         for version in PYTHONS:

@@ -20,10 +20,9 @@ sys.path.append(str(Path(__file__).resolve().parent.parent))
 
 import bpy
 
+from tooling.console import INTERRUPTED, MARK
 from tooling.engine_settings import ENGINES, Engine, assign
 
-MARK = "\x1edeep-gbuffer "
-INTERRUPTED = 130
 EXTENSION_REPOSITORY = "user_default"
 # Measured by our engine only; the others' are null.
 STATISTICS = (
@@ -39,6 +38,12 @@ class JobError(RuntimeError):
 def send(kind: str, content: object) -> None:
     """Tell the parent something."""
     print(MARK + json.dumps({"kind": kind, "content": content}), flush=True)
+
+
+def message(error: Exception) -> str:
+    """The text of an error without the `Error:` that Blender's operators put before each report, each report once."""
+    lines = (line.removeprefix("Error: ") for line in str(error).strip().splitlines())
+    return "\n".join(dict.fromkeys(lines))
 
 
 def add_on(job: dict[str, Any]) -> ModuleType:
@@ -69,7 +74,7 @@ def choose_engine(scene: bpy.types.Scene, engine: Engine) -> None:
     """Make `engine` the scene's. Raises JobError where this Blender has none of its identifiers."""
     for identifier in engine.identifiers:
         try:
-            scene.render.engine = identifier
+            setattr(scene.render, "engine", identifier)  # noqa: B010, its type knows only Blender's own engines
         except TypeError:
             continue
         return
@@ -97,7 +102,7 @@ def choose_format(scene: bpy.types.Scene, suffix: str) -> None:
     image = scene.render.image_settings
     multilayer = suffix == ".exr"
     if hasattr(image, "media_type"):  # from Blender 5.0
-        image.media_type = "MULTI_LAYER_IMAGE" if multilayer else "IMAGE"
+        setattr(image, "media_type", "MULTI_LAYER_IMAGE" if multilayer else "IMAGE")  # noqa: B010, not in 4.5's types
     image.file_format = "OPEN_EXR_MULTILAYER" if multilayer else "PNG"
     if multilayer:
         image.color_depth = "32"
@@ -116,9 +121,9 @@ def render_once(scene: bpy.types.Scene) -> float:
     """Render the current frame into Blender's render result; seconds it took. Raises JobError without a picture."""
     started = time.perf_counter()
     try:
-        outcome = bpy.ops.render.render(scene=scene.name)
+        outcome = bpy.ops.render.render(scene=scene.name) or ()
     except RuntimeError as error:  # the operator's reports, ours included
-        raise JobError(str(error).strip().removeprefix("Error: ")) from error
+        raise JobError(message(error)) from error
     if "FINISHED" not in outcome:
         raise JobError("The render was cancelled.")
     return time.perf_counter() - started
@@ -186,7 +191,7 @@ def main() -> int:
         run(job)
     except (JobError, ValueError, RuntimeError, OSError) as error:
         traceback.print_exc()
-        send("error", str(error).strip().removeprefix("Error: "))
+        send("error", message(error))
         return 1
     return 0
 

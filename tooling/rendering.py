@@ -15,10 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from tooling import environments, packaging, places
-from tooling.console import INTERRUPTED, TAIL_LINES, Progress, ToolError, say, stop, warn
+from tooling.console import INTERRUPTED, MARK, TAIL_LINES, Progress, ToolError, say, stop, warn
 
 JOB = places.REPOSITORY / "tooling" / "render_job.py"
-MARK = "\x1edeep-gbuffer "
 SUFFIXES = (".png", ".exr")
 FRAME_DIGITS = 4
 ANY_WRITE_BIT = 0o222
@@ -81,7 +80,8 @@ def render(options: Namespace) -> int:
     with tempfile.TemporaryDirectory(prefix="deep_gbuffer_") as scratch:
         extension = None
         if real and options.engine == "DEEP_GBUFFER":
-            extension = str(packaging.for_this_machine(Path(scratch) / "extension"))
+            tool = packaging.extension_tool_of(command[0])
+            extension = str(packaging.for_this_machine(Path(scratch) / "extension", tool))
         frames = options.frames or ([options.frame] if options.frame is not None else None)
         job = {
             "file": str(blend),

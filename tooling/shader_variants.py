@@ -4,25 +4,12 @@
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))
 
-from addon.render.passes import PASSES
-from addon.render.programs import ExpandedSource, expand, name_files
-
-
-def variants() -> Iterator[tuple[str, str, ExpandedSource]]:
-    """Every (name, stage, source) that any plan can ask for, equal sources once."""
-    seen: set[str] = set()
-    for spec in (spec for render_pass in PASSES for spec in render_pass.variants()):
-        for stage, path in (("vert", spec.vertex), ("frag", spec.fragment)):
-            source = expand(path, spec)
-            if source.text not in seen:
-                seen.add(source.text)
-                yield f"{path} {' '.join(sorted(spec.defines))}".strip(), stage, source
+from addon.render.programs import ExpandedSource, all_variants, name_files
 
 
 def errors(stage: str, source: ExpandedSource) -> str:
@@ -38,7 +25,7 @@ def errors(stage: str, source: ExpandedSource) -> str:
 
 def main() -> int:
     """Compile all; exit code 1 where one is invalid."""
-    listed = list(variants())
+    listed = list(all_variants())
     with ThreadPoolExecutor() as pool:
         logs = list(pool.map(lambda row: errors(row[1], row[2]), listed))
     for (name, _, _), log in zip(listed, logs, strict=True):

@@ -83,8 +83,8 @@ def run_pytest(python: Path, label: str, kinds: Iterable[str], arguments: list[s
 def bench(options: Namespace) -> int:
     """Run the named bench, or all of them, in the newest Blender; exit code 1 where one failed."""
     known = {path.stem: path for path in sorted(BENCHES.glob("[!_]*.py"))}
-    if options.name and options.name not in known:
-        raise ToolError(f"No bench {options.name!r}; there is {', '.join(known) or 'none yet'}.")
+    if not known or options.name not in {None, *known}:
+        raise ToolError(f"No such bench; there is {', '.join(known) or 'none yet'}.")
     python = environments.blender_python()
     failed: list[str] = []
     for name in [options.name] if options.name else known:

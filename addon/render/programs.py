@@ -145,15 +145,14 @@ class ProgramLibrary:
         return program
 
 
-def all_variants() -> Iterator[tuple[str, str, str]]:
-    """Every variant that any plan can ask for, as (name, stage, full source), for an offline validator."""
+def all_variants() -> Iterator[tuple[str, str, ExpandedSource]]:
+    """Every variant that any plan can ask for, as (name, stage, source), equal sources once: for offline validators."""
     from .passes import PASSES
 
     seen: set[str] = set()
-    for render_pass in PASSES:
-        for spec in render_pass.variants():
-            for stage, path in (("vert", spec.vertex), ("frag", spec.fragment)):
-                source = expand(path, spec).text
-                if source not in seen:
-                    seen.add(source)
-                    yield f"{path} {' '.join(sorted(spec.defines))}".strip(), stage, source
+    for spec in (spec for render_pass in PASSES for spec in render_pass.variants()):
+        for stage, path in (("vert", spec.vertex), ("frag", spec.fragment)):
+            source = expand(path, spec)
+            if source.text not in seen:
+                seen.add(source.text)
+                yield f"{path} {' '.join(sorted(spec.defines))}".strip(), stage, source
