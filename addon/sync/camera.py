@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,7 +22,7 @@ def render_camera(depsgraph: bpy.types.Depsgraph, resolution_x: int, resolution_
     Shift, sensor fit and the scene's pixel aspect are in the window. A panoramic or custom camera
     is shown in perspective (`camera_messages` says so).
     """
-    scene = depsgraph.scene_eval
+    scene: Any = depsgraph.scene_eval
     if scene.camera is None:
         return None
     camera = scene.camera.evaluated_get(depsgraph)
@@ -48,7 +48,8 @@ def render_camera(depsgraph: bpy.types.Depsgraph, resolution_x: int, resolution_
 
 def camera_messages(depsgraph: bpy.types.Depsgraph, messages: Messages) -> None:
     """Report what about the scene's camera cannot be shown."""
-    camera = depsgraph.scene_eval.camera
+    scene: Any = depsgraph.scene_eval
+    camera = scene.camera
     if camera is None:
         return
     if camera.type != "CAMERA":
@@ -68,24 +69,26 @@ def viewport_camera(
     """The camera of a viewport: free perspective or orthographic view, or camera view with its zoom and offset.
 
     Everything but the clip range is read off `region_3d`'s own matrices, so that what is drawn lies where Blender's
-    overlays lie. `region` gives the window's proportions where Blender has not drawn it yet.
+    overlays lie. `region` is not read: `region_3d` has its shape.
     """
     projection = _matrix(region_3d.window_matrix)
     pose = rigid_matrix(np.linalg.inv(_matrix(region_3d.view_matrix)))
     window = _window(projection)
-    if _is_orthographic(projection):
+    orthographic = _is_orthographic(projection)
+    if orthographic and region_3d.view_perspective != "CAMERA":
         return _orthographic_view(pose, projection, window)
     clip = _clip_source(depsgraph, space, region_3d)
-    return Camera(pose, window, clip.clip_start, clip.clip_end, orthographic=False)
+    return Camera(pose, window, clip.clip_start, clip.clip_end, orthographic)
 
 
 def _clip_source(
     depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView3D, region_3d: bpy.types.RegionView3D
-) -> bpy.types.Camera | bpy.types.SpaceView3D:
+) -> Any:
     """Whoever's `clip_start` and `clip_end` hold; a projection matrix has them only roughly."""
     if region_3d.view_perspective != "CAMERA":
         return space
-    camera = space.camera if space.use_local_camera else depsgraph.scene_eval.camera
+    scene: Any = depsgraph.scene_eval
+    camera = space.camera if space.use_local_camera else scene.camera
     if camera is None or camera.type != "CAMERA":
         return space
     return camera.evaluated_get(depsgraph).data

@@ -8,16 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import Any
 
+import bpy
 import numpy as np
 
 from ..scene import InstanceBatch
-from ..scene.arrays import Float64Array, Int32Array
+from ..scene.arrays import BoolArray, Float64Array, Int32Array
 from .changes import Messages, new_version, same_array
-
-if TYPE_CHECKING:
-    import bpy
 
 _FLATTEST = 1e-5
 
@@ -39,24 +37,36 @@ class Placements:
 
 
 def read_matrices(depsgraph: bpy.types.Depsgraph) -> Float64Array:
-    """(N, 4, 4) float64 world matrices of all instances, row-major; Blender delivers them column-major."""
+    """(N, 4, 4) float64 world matrices of all instances, row-major.
+
+    From 5.0 on one call reads them all (column-major). In 4.5 that call never frees the depsgraph's instances, about
+    220 bytes each, so there they are read one by one.
+    """
     instances = depsgraph.object_instances
+    if bpy.app.version < (5, 0, 0):
+        values: list[float] = []
+        for instance in instances:
+            matrix: Any = instance.matrix_world
+            for row in matrix:
+                values.extend(row)
+        return np.array(values, np.float64).reshape(-1, 4, 4)
     matrices = np.empty(len(instances) * 16, np.float32)
     instances.foreach_get("matrix_world", matrices)
     return matrices.reshape(-1, 4, 4).transpose(0, 2, 1).astype(np.float64)
 
 
-def shown_instances(depsgraph: bpy.types.Depsgraph) -> Iterator[tuple[int, bpy.types.DepsgraphObjectInstance]]:
-    """Rows and instances that are themselves visible; each is valid only until the next one is asked for.
+def shown_instances(depsgraph: bpy.types.Depsgraph) -> Iterator[tuple[int, Any, Any]]:
+    """Row, instance and object of all that are themselves visible; each is valid only until the next is asked for.
 
     Viewports do not show objects that are drawn as wires or bounds, as EEVEE does not.
     """
-    shown = np.empty(len(depsgraph.object_instances), np.bool_)
-    depsgraph.object_instances.foreach_get("show_self", shown)
     in_viewport = depsgraph.mode == "VIEWPORT"
     for row, instance in enumerate(depsgraph.object_instances):
-        if shown[row] and not (in_viewport and instance.object.display_type in {"WIRE", "BOUNDS"}):
-            yield row, instance
+        if not instance.show_self:
+            continue
+        shown: Any = instance.object
+        if not (in_viewport and shown.display_type in {"WIRE", "BOUNDS"}):
+            yield row, instance, shown
 
 
 def build_batch(
@@ -86,7 +96,7 @@ def _same_batch(batch: InstanceBatch, matrices: Float64Array, object_index: Int3
     return same_array(batch.matrices, matrices) and same_array(batch.object_index, object_index)
 
 
-def _repair(matrices: Float64Array, placements: Placements, messages: Messages) -> np.ndarray:
+def _repair(matrices: Float64Array, placements: Placements, messages: Messages) -> BoolArray:
     """(N,) which matrices can be used. One that is flat along a single direction (scale 0 on one axis) is made
     very thin instead, in place, so that its normals stay defined."""
     usable = np.isfinite(matrices).all(axis=(1, 2))

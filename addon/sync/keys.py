@@ -7,7 +7,7 @@ makes string order equal creation order, so draws are submitted in the same orde
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import bpy
@@ -18,20 +18,41 @@ DEFAULT_MATERIAL = "default"
 _UNUSED_PERSISTENT_ID = 2**31 - 1
 
 
-def id_key(prefix: str, data_block: bpy.types.ID) -> str:
+def id_key(prefix: str, data_block: Any) -> str:
     """Key of a data-block, original or evaluated: `prefix` and its original's session uid."""
     return f"{prefix}{data_block.original.session_uid:010d}"
 
 
-def mesh_key(instanced: bpy.types.Object, mesh: bpy.types.Mesh, ordinal: int) -> str:
-    """Key of an evaluated mesh.
+class MeshKeys:
+    """Keys of the evaluated meshes seen during one walk over the depsgraph.
 
-    Objects whose modifiers leave the mesh alone share their mesh data-block's key. A mesh that evaluation made
-    belongs to the object, and `ordinal` tells several of one object apart (geometry nodes).
+    Objects that show the same evaluated mesh share its key. A mesh that no modifier changed has the key of its
+    data-block; one that evaluation made has that of the object it was made for, and a number, since geometry nodes
+    may make several.
     """
-    if mesh.original.as_pointer() != mesh.as_pointer():
-        return id_key("mesh", mesh)
-    return f"{id_key('object', instanced)}.{ordinal}"
+
+    def __init__(self) -> None:
+        self._by_pointer: dict[int, str] = {}
+        self._taken: set[str] = set()
+        self._counts: dict[int, int] = {}
+
+    def key(self, shown: Any) -> str:
+        """Key of the mesh that an evaluated object shows."""
+        pointer = shown.data.as_pointer()
+        if pointer not in self._by_pointer:
+            self._by_pointer[pointer] = self._new_key(shown.original)
+        return self._by_pointer[pointer]
+
+    def _new_key(self, original: Any) -> str:
+        if not original.modifiers and original.data is not None:
+            key = id_key("mesh", original.data)
+            if key not in self._taken:
+                self._taken.add(key)
+                return key
+        uid = original.session_uid
+        count = self._counts.get(uid, 0)
+        self._counts[uid] = count + 1
+        return f"{id_key('object', original)}.{count}"
 
 
 def instance_key(instance: bpy.types.DepsgraphObjectInstance) -> str:

@@ -4,14 +4,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..scene import AreaShape, Light, LightKind
 from ..scene.arrays import Color, Float64Array
 from .changes import Messages
-from .materials import ImageTable, evaluate_emission
+from .materials import ImageTable, evaluate_emission, has_nodes
 
 if TYPE_CHECKING:
     import bpy
@@ -21,7 +21,7 @@ def read_light(
     key: str, shown: bpy.types.Object, matrix: Float64Array, images: ImageTable, messages: Messages
 ) -> Light | None:
     """The light of an evaluated object or instance with world matrix `matrix` (4, 4); None where that is broken."""
-    light: bpy.types.Light = shown.data
+    light: Any = shown.data
     name = shown.name
     axes = matrix[:3, :3]
     lengths = np.linalg.norm(axes, axis=0)
@@ -29,11 +29,11 @@ def read_light(
         messages.add(key, "matrix", f"Light “{name}” has a scale of zero or a broken transform; it is left out.")
         return None
     color = _color(light)
-    if light.use_nodes and light.node_tree is not None:
+    if has_nodes(light):
         emission, warnings = evaluate_emission(f"Light “{name}”", light.node_tree, "ShaderNodeOutputLight", images)
         messages.extend(key, warnings)
         color = (color[0] * emission[0], color[1] * emission[1], color[2] * emission[2])
-    common = {
+    common: dict[str, Any] = {
         "key": key,
         "name": name,
         "world_from_light": rigid_matrix(matrix),
@@ -99,7 +99,7 @@ def _unit(vector: Float64Array, otherwise: Float64Array) -> Float64Array:
     return vector / length if length > 0.0 else otherwise
 
 
-def _color(light: bpy.types.Light) -> Color:
+def _color(light: Any) -> Color:
     scale = light.energy * 2.0**light.exposure
     red, green, blue = (channel * scale for channel in light.color)
     if not light.use_temperature:
@@ -112,7 +112,7 @@ def _scaled(color: Color, factor: float) -> Color:
     return color[0] * factor, color[1] * factor, color[2] * factor
 
 
-def _area_light(light: bpy.types.AreaLight, color: Color, lengths: Float64Array, common: dict[str, object]) -> Light:
+def _area_light(light: Any, color: Color, lengths: Float64Array, common: dict[str, Any]) -> Light:
     width = light.size
     height = light.size_y if light.shape in {"RECTANGLE", "ELLIPSE"} else light.size
     size = (width * float(lengths[0]), height * float(lengths[1]))

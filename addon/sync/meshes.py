@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -63,12 +63,12 @@ class MeshRecord:
 def update_mesh(
     key: str, name: str, mesh: bpy.types.Mesh, colour_attribute: str | None, previous: MeshRecord | None
 ) -> MeshRecord:
-    """The record of an evaluated mesh: `previous` itself where nothing changed.
+    """The record of an evaluated mesh: `previous` itself where nothing changed, whatever `name` is by now.
 
     `colour_attribute` names the one that the object's materials read; None takes the mesh's own choice.
     """
     raw = _read(mesh, colour_attribute)
-    if previous is not None and previous.mesh.name == name:
+    if previous is not None:
         changed = raw.changed_fields(previous.raw)
         if not changed:
             return previous
@@ -86,19 +86,23 @@ def _read(mesh: bpy.types.Mesh, colour_attribute: str | None) -> RawMesh:
     normal_source = mesh.vertex_normals if by_points else mesh.corner_normals
     normals = np.empty(len(normal_source) * 3, np.float32)
     normal_source.foreach_get("vector", normals)
+    normals = normals.reshape(-1, 3)
+    if mesh.has_custom_normals:  # Blender takes them as they were stored
+        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+        np.divide(normals, lengths, out=normals, where=lengths > 0.0)
     return RawMesh(
         by_points=by_points,
         positions=_read_attribute(mesh, "position", "vector", np.float32, len(mesh.vertices) * 3).reshape(-1, 3),
         corner_points=corner_points,
         triangle_corners=_read_triangle_corners(mesh),
-        normals=normals.reshape(-1, 3),
+        normals=normals,
         triangle_slots=_read_triangle_slots(mesh),
         uvs=uvs,
         colors=colors,
     )
 
 
-def _read_attribute(mesh: bpy.types.Mesh, name: str, member: str, dtype: type, length: int) -> np.ndarray:
+def _read_attribute(mesh: Any, name: str, member: str, dtype: type, length: int) -> Any:
     values = np.empty(length, dtype)
     if length:
         mesh.attributes[name].data.foreach_get(member, values)
@@ -114,17 +118,15 @@ def _read_uvs(mesh: bpy.types.Mesh) -> Float32Array | None:
     return uvs.reshape(-1, 2)
 
 
-def _find_colour_attribute(mesh: bpy.types.Mesh, name: str | None) -> bpy.types.Attribute | None:
-    attributes = mesh.color_attributes
+def _find_colour_attribute(mesh: bpy.types.Mesh, name: str | None) -> Any:
+    attributes: Any = mesh.color_attributes
     if name and name in attributes:
         return attributes[name]
     index = attributes.render_color_index
     return attributes[index] if 0 <= index < len(attributes) else None
 
 
-def _read_colors(
-    attribute: bpy.types.Attribute | None, corner_points: Int32Array, by_points: bool
-) -> Float32Array | None:
+def _read_colors(attribute: Any, corner_points: Int32Array, by_points: bool) -> Float32Array | None:
     if attribute is None or not len(attribute.data):
         return None
     colors = np.empty(len(attribute.data) * 4, np.float32)

@@ -4,14 +4,15 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..scene import InstanceBatch, Light, Scene
 from .camera import camera_messages, render_camera
 from .changes import Messages, new_version, same_fields
 from .instances import Placements, build_batch, read_matrices, shown_instances
-from .keys import id_key, instance_key, mesh_key
+from .keys import MeshKeys, id_key, instance_key
 from .lights import read_light
 from .materials import MaterialTable
 from .meshes import MeshRecord, update_mesh
@@ -61,10 +62,11 @@ class Mirror:
         gathering.run()
         self._meshes = gathering.meshes
         batches = gathering.batches({batch.key: batch for batch in self._scene.batches})
-        world = read_world(depsgraph.scene_eval.world, self._materials.images, messages)
+        blender_scene: Any = depsgraph.scene_eval
+        world = read_world(blender_scene.world, self._materials.images, messages)
         materials, images = self._materials.collect()
         camera_messages(depsgraph, messages)
-        render = depsgraph.scene_eval.render
+        render = blender_scene.render
         scale = render.resolution_percentage / 100.0
         width, height = int(render.resolution_x * scale), int(render.resolution_y * scale)
         scene = Scene(
@@ -96,18 +98,16 @@ class _Gathering:
         self._previous = previous
         self._materials = materials
         self._messages = messages
-        self._override = depsgraph.view_layer_eval.material_override
+        view_layer: Any = depsgraph.view_layer_eval
+        self._override = view_layer.material_override
         self._matrices = read_matrices(depsgraph)
         self._seen: dict[tuple[int, int], tuple[Placements, int] | None] = {}
         self._placements: dict[tuple[str, tuple[str, ...]], Placements] = {}
-        self._evaluated: dict[int, int] = {}
-        self._faceless: dict[int, str] = {}
-        self._instancers: set[int] = set()
+        self._mesh_keys = MeshKeys()
 
     def run(self) -> None:
         """Fill `meshes`, `lights` and the placements."""
-        for row, instance in shown_instances(self._depsgraph):
-            shown = instance.object
+        for row, instance, shown in shown_instances(self._depsgraph):
             kind = shown.type
             if kind == "MESH":
                 self._place(row, instance, shown)
@@ -118,9 +118,6 @@ class _Gathering:
                     self.lights.append(light)
             elif kind in _UNSUPPORTED:
                 self._messages.add_named(_UNSUPPORTED[kind], shown.name)
-        for uid, name in self._faceless.items():
-            if uid not in self._instancers:
-                self._messages.add_named(_NO_FACES, name)
 
     def batches(self, previous: dict[str, InstanceBatch]) -> tuple[InstanceBatch, ...]:
         """The placements as batches in the order of their keys."""
@@ -128,44 +125,40 @@ class _Gathering:
         built = (build_batch(p, self._matrices, previous.get(p.key), self._messages) for p in ordered)
         return tuple(batch for batch in built if batch is not None)
 
-    def _place(self, row: int, instance: bpy.types.DepsgraphObjectInstance, shown: bpy.types.Object) -> None:
+    def _place(self, row: int, instance: Any, shown: Any) -> None:
         uid = shown.original.session_uid
         identity = (shown.data.as_pointer(), uid)
         if identity not in self._seen:
-            self._seen[identity] = self._first(instance, shown, uid)
+            self._seen[identity] = self._first(instance, shown)
         entry = self._seen[identity]
         if entry is not None:
             placements, object_index = entry
             placements.rows.append(row)
             placements.object_index.append(object_index)
 
-    def _first(
-        self, instance: bpy.types.DepsgraphObjectInstance, shown: bpy.types.Object, uid: int
-    ) -> tuple[Placements, int] | None:
+    def _first(self, instance: Any, shown: Any) -> tuple[Placements, int] | None:
         """What all instances of one object with one mesh share; None where there is nothing to draw."""
-        if instance.is_instance:
-            self._instancers.add(instance.parent.original.session_uid)
-        elif _has_hair(shown):
+        if not instance.is_instance and _has_hair(shown):
             self._messages.add_named(_HAIR, shown.name)
         mesh = shown.data
-        ordinal = self._evaluated.get(uid, 0)
-        self._evaluated[uid] = ordinal + 1
         if len(mesh.polygons) == 0:
-            if not instance.is_instance:
-                self._faceless[uid] = shown.name
+            if not (instance.is_instance or _is_instancer(shown)):
+                self._messages.add_named(_NO_FACES, shown.name)
             return None
-        materials = self._slot_materials(shown)
-        key = mesh_key(shown, mesh, ordinal)
+        materials, attribute = self._slot_materials(shown)
+        key = self._mesh_keys.key(shown)
         if key not in self.meshes:
-            self.meshes[key] = update_mesh(key, shown.name, mesh, materials[1], self._previous.get(key))
+            self.meshes[key] = update_mesh(key, shown.name, mesh, attribute, self._previous.get(key))
             self._messages.extend(key, self.meshes[key].warnings)
         if not self.meshes[key].mesh.slots:
             return None
-        placements = self._placements.setdefault((key, materials[0]), Placements(key, materials[0]))
+        if (key, materials) not in self._placements:
+            self._placements[key, materials] = Placements(key, materials)
+        placements = self._placements[key, materials]
         placements.names.add(shown.name)
         return placements, shown.pass_index
 
-    def _slot_materials(self, shown: bpy.types.Object) -> tuple[tuple[str, ...], str | None]:
+    def _slot_materials(self, shown: Any) -> tuple[tuple[str, ...], str | None]:
         """Keys of the materials in an object's slots, and the colour attribute that the first of them reads."""
         slots = [slot.material for slot in shown.material_slots] or [None]
         if self._override is not None:
@@ -175,16 +168,19 @@ class _Gathering:
         return tuple(record.material.key for record in records), attribute
 
 
-def _has_hair(shown: bpy.types.Object) -> bool:
+def _has_hair(shown: Any) -> bool:
     return any(
         system.settings.type == "HAIR" and system.settings.render_type == "PATH" for system in shown.particle_systems
     )
 
 
+def _is_instancer(shown: Any) -> bool:
+    return shown.instance_type != "NONE" or any(m.type in {"NODES", "PARTICLE_SYSTEM"} for m in shown.modifiers)
+
+
 def _updated_images(depsgraph: bpy.types.Depsgraph) -> frozenset[str]:
-    return frozenset(
-        id_key("image", update.id) for update in depsgraph.updates if update.id.bl_rna.identifier == "Image"
-    )
+    updated: list[Any] = [update.id for update in depsgraph.updates]
+    return frozenset(id_key("image", item) for item in updated if item.bl_rna.identifier == "Image")
 
 
 def _with_versions(scene: Scene, previous: Scene) -> Scene:
@@ -205,7 +201,7 @@ def _with_versions(scene: Scene, previous: Scene) -> Scene:
     return replace(scene, versions=replace(previous.versions, **raised))
 
 
-def _same_items(first: dict[str, object], second: dict[str, object]) -> bool:
+def _same_items(first: Mapping[str, object], second: Mapping[str, object]) -> bool:
     return first.keys() == second.keys() and all(first[key] is second[key] for key in first)
 
 

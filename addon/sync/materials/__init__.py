@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ...scene import BaseColorSource, Extension, Image, ImageTexture, Interpolation, Material
 from ...scene.arrays import Color
@@ -72,10 +72,11 @@ class MaterialTable:
 
     def _read(self, key: str, material: bpy.types.Material) -> MaterialRecord:
         owner = f"Material “{material.name}”"
+        tree: Any = material.node_tree
         if not has_nodes(material):
             return _without_nodes(key, material)
         evaluator = Evaluator(owner, self.images)
-        output = find_output(material.node_tree, "ShaderNodeOutputMaterial")
+        output = find_output(tree, "ShaderNodeOutputMaterial")
         if output is None or find_source(output.inputs["Surface"], ()).node is None:
             text = f"{owner} has no surface shader connected to its output; it is shown black."
             return MaterialRecord(_material(key, material, Surface()), None, (text,))
@@ -113,7 +114,7 @@ class MaterialTable:
             if color is None or mask.key != color.key or alpha.component != "ALPHA":
                 image = self.images.with_mask(color, mask, alpha.component)
         assert image is not None
-        node = base.texture or alpha.texture
+        node: Any = alpha.texture if base.texture is None else base.texture
         texture = ImageTexture(
             image=image.key,
             extension=Extension(node.extension),
@@ -125,9 +126,7 @@ class MaterialTable:
         return MaterialRecord(textured, None, tuple(evaluator.warnings))
 
 
-def evaluate_emission(
-    owner: str, tree: bpy.types.NodeTree, output_type: str, images: ImageTable
-) -> tuple[Color, tuple[str, ...]]:
+def evaluate_emission(owner: str, tree: Any, output_type: str, images: ImageTable) -> tuple[Color, tuple[str, ...]]:
     """The constant emission of a world's or light's node graph, and texts about what is not constant in it.
 
     `owner` begins each text; `output_type` is the graph's kind of output node. Black where nothing is connected.
@@ -143,23 +142,21 @@ def evaluate_emission(
 
 
 def _default() -> MaterialRecord:
-    material = Material(key=DEFAULT_MATERIAL, name="(empty slot)", version=new_version())
+    material = Material(key=DEFAULT_MATERIAL, name="(empty slot)", version=new_version(), specular=0.0)
     return MaterialRecord(material, None, ())
 
 
 def _without_nodes(key: str, material: bpy.types.Material) -> MaterialRecord:
-    red, green, blue, alpha = material.diffuse_color
+    red, green, blue, _ = material.diffuse_color
     mirrored = Material(
         key=key,
         name=material.name,
         version=new_version(),
         base_color=(red, green, blue),
-        alpha=alpha,
-        metallic=material.metallic,
-        roughness=material.roughness,
+        specular=0.0,
         backface_culling=material.use_backface_culling,
     )
-    text = f"Material “{material.name}” has no nodes; its viewport colour, metallic and roughness are used instead."
+    text = f"Material “{material.name}” has no nodes; a diffuse surface of its viewport colour is shown."
     return MaterialRecord(mirrored, None, (text,))
 
 

@@ -7,14 +7,11 @@ import colorsys
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import Any
 
 from ...scene.arrays import Color
-from .graph import Groups, Source, find_source
+from .graph import Groups, Node, Socket, Source, find_source
 from .images import ImageTable
-
-if TYPE_CHECKING:
-    import bpy
 
 LUMINANCE = (0.2126, 0.7152, 0.0722)
 WHITE: Color = (1.0, 1.0, 1.0)
@@ -30,7 +27,7 @@ class Expression:
     """
 
     factor: Color
-    texture: bpy.types.ShaderNodeTexImage | None = None
+    texture: Node | None = None
     component: str = "RGB"
     attribute: str | None = None
 
@@ -39,9 +36,13 @@ class Expression:
         """Whether `factor` is all there is."""
         return self.texture is None and self.attribute is None
 
-    def scaled(self, factor: Color) -> Expression:
+    def times(self, color: Color) -> Expression:
         """This expression times a constant colour."""
-        return replace(self, factor=multiply(self.factor, factor))
+        return replace(self, factor=multiply(self.factor, color))
+
+    def scaled(self, value: float) -> Expression:
+        """This expression times a number."""
+        return self.times(_uniform(value))
 
 
 def grey(value: float) -> Expression:
@@ -84,11 +85,11 @@ class Evaluator:
             "ShaderNodeLayerWeight": self._fresnel,
         }
 
-    def warn(self, node: bpy.types.Node, text: str) -> None:
+    def warn(self, node: Node, text: str) -> None:
         """Report once what `node` asks for and what is shown instead; `text` is a clause."""
         self.warnings.setdefault(f"{self.owner}, node “{node.name}”: {text}.", None)
 
-    def expression(self, socket: bpy.types.NodeSocket, groups: Groups) -> Expression:
+    def expression(self, socket: Socket, groups: Groups) -> Expression:
         """What an input receives."""
         source = find_source(socket, groups)
         if source.node is None:
@@ -98,17 +99,16 @@ class Evaluator:
         handler = self._handlers.get(source.node.bl_idname)
         return self._unknown(source) if handler is None else handler(source)
 
-    def color(self, socket: bpy.types.NodeSocket, groups: Groups) -> Color:
+    def color(self, socket: Socket, groups: Groups) -> Color:
         """What an input receives as one colour; a texture is replaced by its mean, and the user is told."""
-        expression = self.expression(socket, groups)
-        return self.reduce(expression, socket.node, socket.name)
+        return self.reduce(self.expression(socket, groups), socket.node, socket.name)
 
-    def value(self, socket: bpy.types.NodeSocket, groups: Groups) -> float:
+    def value(self, socket: Socket, groups: Groups) -> float:
         """What an input receives as one number; a texture is replaced by its mean, and the user is told."""
         color = self.color(socket, groups)
         return color[0] if color[0] == color[1] == color[2] else luminance(color)
 
-    def reduce(self, expression: Expression, node: bpy.types.Node, what: str) -> Color:
+    def reduce(self, expression: Expression, node: Node, what: str) -> Color:
         """`expression` without its texture or attribute, which the user is told `node` cannot have for `what`."""
         if expression.is_constant:
             return expression.factor
@@ -123,7 +123,7 @@ class Evaluator:
         by_component = {"RED": red, "GREEN": green, "BLUE": blue, "ALPHA": alpha, "INVERTED_ALPHA": 1.0 - alpha}
         if expression.component == "RGB":
             return red, green, blue
-        return (by_component[expression.component],) * 3
+        return _uniform(by_component[expression.component])
 
     def _unknown(self, source: Source) -> Expression:
         colors = [entry for entry in source.node.inputs if entry.type == "RGBA" and entry.enabled]
@@ -144,10 +144,10 @@ class Evaluator:
         self.warn(source.node, "environment images are not rendered yet; the image's mean is used instead")
         return Expression(self.images.mirror(source.node, self.owner).mean[:3])
 
-    def _check_projection(self, node: bpy.types.ShaderNodeTexImage, groups: Groups) -> None:
+    def _check_projection(self, node: Node, groups: Groups) -> None:
         vector = find_source(node.inputs["Vector"], groups)
-        by_uv = vector.node is None or vector.node.bl_idname == "ShaderNodeUVMap"
-        by_uv = by_uv or (vector.node.bl_idname == "ShaderNodeTexCoord" and vector.socket.identifier == "UV")
+        kind = "" if vector.node is None else vector.node.bl_idname
+        by_uv = kind in {"", "ShaderNodeUVMap"} or (kind == "ShaderNodeTexCoord" and vector.socket.identifier == "UV")
         if not by_uv or node.projection != "FLAT":
             self.warn(node, "only the plain UV map is rendered yet; other coordinates and projections are ignored")
 
@@ -175,9 +175,7 @@ class Evaluator:
     def _mix_legacy(self, source: Source) -> Expression:
         return self._blend(source, source.node.blend_type, tuple(source.node.inputs[:3]), True)
 
-    def _blend(
-        self, source: Source, blend: str, inputs: tuple[bpy.types.NodeSocket, ...], clamp_factor: bool
-    ) -> Expression:
+    def _blend(self, source: Source, blend: str, inputs: tuple[Socket, ...], clamp_factor: bool) -> Expression:
         fraction = self.value(inputs[0], source.groups)
         if clamp_factor:
             fraction = min(max(fraction, 0.0), 1.0)
@@ -191,12 +189,12 @@ class Evaluator:
             if operation is None:
                 self.warn(source.node, f"blend mode {blend.title()} is not rendered yet; plain mixing is used instead")
                 operation = _BLENDS["MIX"]
-            blended = (operation(a, b) for a, b in zip(first.factor, second.factor, strict=True))
-            return Expression(_lerp(first.factor, tuple(blended), fraction))
+            blended = per_channel(operation, first.factor, second.factor)
+            return Expression(_lerp(first.factor, blended, fraction))
         if blend == "MULTIPLY" and second.is_constant:
-            return first.scaled(_lerp(WHITE, second.factor, fraction))
+            return first.times(_lerp(WHITE, second.factor, fraction))
         if blend == "MULTIPLY" and first.is_constant and fraction == 1.0:
-            return second.scaled(first.factor)
+            return second.times(first.factor)
         kept = first if not first.is_constant and (blend != "MIX" or fraction < 0.5 or second.is_constant) else second
         if blend == "MULTIPLY" and second.texture is not None and first.attribute is not None:
             kept = second
@@ -209,7 +207,7 @@ class Evaluator:
             first, second = (self.expression(entry, source.groups) for entry in node.inputs[:2])
             if first.is_constant or second.is_constant:
                 constant, other = (first, second) if first.is_constant else (second, first)
-                return other.scaled((luminance(constant.factor),) * 3)
+                return other.scaled(luminance(constant.factor))
         if node.operation == "SUBTRACT":
             first, second = (self.expression(entry, source.groups) for entry in node.inputs[:2])
             if first == grey(1.0) and second == Expression(WHITE, second.texture, "ALPHA"):
@@ -235,13 +233,13 @@ class Evaluator:
     def _gamma(self, source: Source) -> Expression:
         gamma = self.value(source.node.inputs["Gamma"], source.groups)
         return self._adjust(
-            source, lambda color: tuple(max(c, 0.0) ** gamma if c > 0.0 else c for c in color), neutral=gamma == 1.0
+            source, lambda color: per_channel(lambda c: c**gamma if c > 0.0 else c, color), neutral=gamma == 1.0
         )
 
     def _invert(self, source: Source) -> Expression:
         fraction = self.value(source.node.inputs[0], source.groups)
         return self._adjust(
-            source, lambda color: _lerp(color, tuple(1.0 - c for c in color), fraction), neutral=fraction == 0.0
+            source, lambda color: _lerp(color, per_channel(lambda c: 1.0 - c, color), fraction), neutral=fraction == 0.0
         )
 
     def _hue_saturation(self, source: Source) -> Expression:
@@ -253,7 +251,7 @@ class Evaluator:
             old_hue, old_saturation, old_value = colorsys.rgb_to_hsv(*color)
             new_saturation = min(max(old_saturation * saturation, 0.0), 1.0)
             shifted = colorsys.hsv_to_rgb((old_hue + hue + 0.5) % 1.0, new_saturation, old_value * value)
-            return _lerp(color, tuple(max(c, 0.0) for c in shifted), fraction)
+            return _lerp(color, per_channel(lambda c: max(c, 0.0), shifted), fraction)
 
         return self._adjust(source, adjust, neutral=fraction == 0.0 or (hue, saturation, value) == (0.5, 1.0, 1.0))
 
@@ -261,7 +259,9 @@ class Evaluator:
         bright, contrast = (self.value(source.node.inputs[name], source.groups) for name in ("Bright", "Contrast"))
         scale, offset = 1.0 + contrast, bright - contrast * 0.5
         return self._adjust(
-            source, lambda color: tuple(max(c * scale + offset, 0.0) for c in color), neutral=bright == contrast == 0.0
+            source,
+            lambda color: per_channel(lambda c: max(c * scale + offset, 0.0), color),
+            neutral=bright == contrast == 0.0,
         )
 
     def _color_ramp(self, source: Source) -> Expression:
@@ -278,7 +278,7 @@ class Evaluator:
         expression = self.expression(source.node.inputs[0], source.groups)
         index = ("Red", "Green", "Blue").index(source.socket.identifier)
         component = source.socket.identifier.upper() if expression.component == "RGB" else expression.component
-        return replace(expression, factor=(expression.factor[index],) * 3, component=component)
+        return replace(expression, factor=_uniform(expression.factor[index]), component=component)
 
     def _combine(self, source: Source) -> Expression:
         if source.node.mode != "RGB":
@@ -305,7 +305,7 @@ def reflectance(index_of_refraction: float) -> float:
     return ((index_of_refraction - 1.0) / (index_of_refraction + 1.0)) ** 2
 
 
-def _socket_value(socket: bpy.types.NodeSocket) -> Expression:
+def _socket_value(socket: Socket) -> Expression:
     value = getattr(socket, "default_value", 0.0)
     if isinstance(value, bool | int | float):
         return grey(float(value))
@@ -318,8 +318,17 @@ def multiply(first: Color, second: Color) -> Color:
 
 
 def _lerp(first: Color, second: Color, fraction: float) -> Color:
-    red, green, blue = (a + (b - a) * fraction for a, b in zip(first, second, strict=True))
+    return per_channel(lambda a, b: a + (b - a) * fraction, first, second)
+
+
+def per_channel(operation: Callable[..., float], *colors: Color) -> Color:
+    """`operation` on the channels of one or more colours."""
+    red, green, blue = (operation(*channels) for channels in zip(*colors, strict=True))
     return red, green, blue
+
+
+def _uniform(value: float) -> Color:
+    return value, value, value
 
 
 _BLENDS: dict[str, Callable[[float, float], float]] = {
@@ -335,7 +344,7 @@ _BLENDS: dict[str, Callable[[float, float], float]] = {
     "OVERLAY": lambda a, b: 2.0 * a * b if a < 0.5 else 1.0 - 2.0 * (1.0 - a) * (1.0 - b),
 }
 
-_MATH: dict[str, Callable[..., float]] = {
+_MATH: dict[str, Callable[..., Any]] = {
     "ADD": lambda a, b: a + b,
     "SUBTRACT": lambda a, b: a - b,
     "MULTIPLY": lambda a, b: a * b,

@@ -7,10 +7,15 @@ Blender 5 can flatten a tree itself (`inline_shader_nodes`); 4.5 cannot, so both
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 
-Groups = tuple[bpy.types.ShaderNodeGroup, ...]
+Node = Any
+"""A shader node. Which properties it has depends on `bl_idname`, which type checkers cannot follow; so with sockets."""
+Socket = Any
+Groups = tuple[Node, ...]
+"""Group nodes entered on the way to a node, outermost first."""
 
 
 @dataclass(frozen=True)
@@ -20,15 +25,15 @@ class Source:
     `groups` are the group nodes entered on the way, outermost first.
     """
 
-    node: bpy.types.Node | None
-    socket: bpy.types.NodeSocket
+    node: Node
+    socket: Socket
     groups: Groups
 
 
-def find_source(socket: bpy.types.NodeSocket, groups: Groups) -> Source:
+def find_source(socket: Socket, groups: Groups) -> Source:
     """What drives the input `socket` of a node inside `groups`."""
     while True:
-        link = _used_link(socket)
+        link: Any = _used_link(socket)
         if link is None:
             return Source(None, socket, groups)
         output, node = link.from_socket, link.from_node
@@ -48,15 +53,15 @@ def find_source(socket: bpy.types.NodeSocket, groups: Groups) -> Source:
             return Source(node, output, groups)
 
 
-def has_nodes(data_block: bpy.types.Material | bpy.types.World) -> bool:
-    """Whether a node graph defines a material or world. From 5.0 on that is always so where there is one, and
+def has_nodes(data_block: Any) -> bool:
+    """Whether a node graph defines a material, world or light. From 5.0 on that is always so where there is one, and
     asking for `use_nodes` is deprecated."""
     if data_block.node_tree is None:
         return False
     return bpy.app.version >= (5, 0, 0) or data_block.use_nodes
 
 
-def find_output(tree: bpy.types.NodeTree, kind: str) -> bpy.types.Node | None:
+def find_output(tree: Any, kind: str) -> Node | None:
     """The active output node of type `kind` that Cycles would use: made for Cycles, else for all renderers."""
     outputs = [node for node in tree.nodes if node.bl_idname == kind and not node.mute]
     for target in ("CYCLES", "ALL", "EEVEE"):
@@ -66,13 +71,13 @@ def find_output(tree: bpy.types.NodeTree, kind: str) -> bpy.types.Node | None:
     return None
 
 
-def _used_link(socket: bpy.types.NodeSocket) -> bpy.types.NodeLink | None:
+def _used_link(socket: Socket) -> bpy.types.NodeLink | None:
     if not socket.is_linked:
         return None
     return next((link for link in socket.links if link.is_valid and not link.is_muted), None)
 
 
-def _group_result(node: bpy.types.ShaderNodeGroup, identifier: str) -> bpy.types.NodeSocket | None:
+def _group_result(node: Node, identifier: str) -> Socket | None:
     if node.node_tree is None:
         return None
     outputs = [inner for inner in node.node_tree.nodes if inner.type == "GROUP_OUTPUT"]

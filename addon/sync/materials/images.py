@@ -3,21 +3,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import Any
 
+import bpy
 import numpy as np
 
 from ...scene import Image
 from ...scene.arrays import Float32Array, UInt8Array
 from ..changes import Messages, new_version, same_array
 from ..keys import id_key
-
-if TYPE_CHECKING:
-    import bpy
-
-    ImageNode = bpy.types.ShaderNodeTexImage | bpy.types.ShaderNodeTexEnvironment
+from .graph import Node
 
 RGBA = tuple[float, float, float, float]
 
@@ -28,12 +25,16 @@ _LINEAR_SPACES = frozenset({"Linear", "Linear Rec.709", "Raw", "Non-Color", "Gen
 
 @dataclass(frozen=True)
 class ImageRecord:
-    """A mirrored image; `signature` tells whether its pixels may have changed. `mean` is linear RGBA."""
+    """A mirrored image; `signature` tells whether its pixels may have changed. `mean` is linear RGBA.
+
+    `transparent`: some alpha is below 1, and it is meant as the colour's opacity.
+    """
 
     signature: tuple[object, ...]
     image: Image
     mean: RGBA
     warnings: tuple[str, ...] = ()
+    transparent: bool = False
 
 
 class ImageTable:
@@ -60,8 +61,18 @@ class ImageTable:
         """The images with these keys, which must all have been mirrored since `begin`."""
         return {key: self._current[key].image for key in sorted(keys)}
 
-    def mirror(self, node: ImageNode, owner: str) -> ImageRecord:
-        """The record of the image that a texture node shows; `owner` begins texts about the node."""
+    def mirror(self, node: Node, owner: str) -> ImageRecord:
+        """The record of the image that a texture node shows; `owner` begins texts about the node.
+
+        As in Cycles, encoded colours are multiplied by alpha where the node's Alpha output is not used.
+        """
+        record = self._mirror_image(node, owner)
+        alpha = node.outputs.get("Alpha")
+        if record.transparent and alpha is not None and not alpha.is_linked:
+            return self._premultiplied(record.image)
+        return record
+
+    def _mirror_image(self, node: Node, owner: str) -> ImageRecord:
         if node.image is None:
             text = f"{owner}, node “{node.name}” has no image; magenta is shown instead."
             self._messages.add(owner, node.name, text)
@@ -85,15 +96,23 @@ class ImageTable:
         """
         key = f"{color.key if color else 'white'}+{mask.key}.{component}"
         signature = (color and color.version, mask.version)
+        return self._derived(key, signature, lambda: _masked(key, color, mask, component)).image
+
+    def _premultiplied(self, image: Image) -> ImageRecord:
+        key = f"{image.key}.premultiplied"
+        return self._derived(key, (image.version,), lambda: _premultiply(key, image))
+
+    def _derived(self, key: str, signature: tuple[object, ...], make: Callable[[], Image]) -> ImageRecord:
+        """An image made from others, made anew only when their versions (`signature`) change."""
         record = self._current.get(key) or self._previous.get(key)
         if record is None or record.signature != signature:
-            image = _masked(key, color, mask, component)
+            image = make()
             record = ImageRecord(signature, image, _mean(image))
         self._current[key] = record
-        return record.image
+        return record
 
 
-def _signature(image: bpy.types.Image) -> tuple[object, ...]:
+def _signature(image: Any) -> tuple[object, ...]:
     return (
         image.name,
         image.filepath,
@@ -115,7 +134,7 @@ def _magenta(key: str, name: str, signature: tuple[object, ...], warnings: tuple
     return ImageRecord(signature, image, (1.0, 0.0, 1.0, 1.0), warnings)
 
 
-def _read(key: str, image: bpy.types.Image, signature: tuple[object, ...], previous: ImageRecord | None) -> ImageRecord:
+def _read(key: str, image: Any, signature: tuple[object, ...], previous: ImageRecord | None) -> ImageRecord:
     width, height = image.size
     if width == 0 or height == 0 or len(image.pixels) == 0:
         where = f" ({image.filepath})" if image.filepath else ""
@@ -132,16 +151,17 @@ def _read(key: str, image: bpy.types.Image, signature: tuple[object, ...], previ
     srgb = not image.is_float and not image.colorspace_settings.is_data and space not in _LINEAR_SPACES
     warnings = _limitations(image, srgb)
     if previous is not None and previous.warnings == warnings and _same_image(previous.image, image.name, pixels, srgb):
-        return ImageRecord(_signature(image), previous.image, previous.mean, warnings)
+        return replace(previous, signature=_signature(image))
     mirrored = Image(key=key, name=image.name, version=new_version(), pixels=pixels, srgb=srgb)
-    return ImageRecord(_signature(image), mirrored, _mean(mirrored), warnings)
+    transparent = _has_opacity(image) and bool((values[..., 3] < 1.0).any())
+    return ImageRecord(_signature(image), mirrored, _mean(mirrored), warnings, transparent)
 
 
 def _same_image(image: Image, name: str, pixels: UInt8Array | Float32Array, srgb: bool) -> bool:
     return image.name == name and image.srgb == srgb and same_array(image.pixels, pixels)
 
 
-def _limitations(image: bpy.types.Image, srgb: bool) -> tuple[str, ...]:
+def _limitations(image: Any, srgb: bool) -> tuple[str, ...]:
     texts = []
     if image.source == "TILED" and len(image.tiles) > 1:
         texts.append(f"Image “{image.name}” has {len(image.tiles)} UDIM tiles; only the first is rendered yet.")
@@ -153,32 +173,44 @@ def _limitations(image: bpy.types.Image, srgb: bool) -> tuple[str, ...]:
     return tuple(texts)
 
 
-def _four_channels(values: Float32Array, image: bpy.types.Image) -> Float32Array:
+def _four_channels(values: Float32Array, image: Any) -> Float32Array:
     """(H, W, 4) with straight alpha, as `image.alpha_mode` asks."""
     height, width, channels = values.shape
     pixels = np.ones((height, width, 4), np.float32)
     pixels[..., :3] = values[..., :1] if channels < 3 else values[..., :3]
     if channels in {2, 4} and image.alpha_mode != "NONE":
         pixels[..., 3] = values[..., -1]
-    premultiplied = image.is_float and image.alpha_mode in {"STRAIGHT", "PREMUL"}  # Blender's own float buffers
-    if premultiplied and (pixels[..., 3] != 1.0).any():
+    if _has_opacity(image) and _is_stored_premultiplied(image) and (pixels[..., 3] != 1.0).any():
         alpha = pixels[..., 3:]
         np.divide(pixels[..., :3], alpha, out=pixels[..., :3], where=alpha > 0.0)
+    if not image.is_float:
+        np.clip(pixels, 0.0, 1.0, out=pixels)
     if not np.isfinite(pixels).all():
         pixels = np.nan_to_num(pixels, nan=0.0, posinf=0.0, neginf=0.0)
     return pixels
 
 
+def _has_opacity(image: Any) -> bool:
+    """Whether alpha is the opacity of the colours, not just a fourth channel; never so for data."""
+    return image.alpha_mode in {"STRAIGHT", "PREMUL"} and not image.colorspace_settings.is_data
+
+
+def _is_stored_premultiplied(image: Any) -> bool:
+    """Whether pixels come multiplied by alpha: before 5.0 by how they are stored, since then as the image says."""
+    return image.is_float if bpy.app.version < (5, 0, 0) else image.alpha_mode == "PREMUL"
+
+
 def linear(image: Image) -> Float32Array:
     """(H, W, 4) float32 scene-linear colour and alpha of an image."""
-    if image.pixels.dtype == np.float32:
-        return np.asarray(image.pixels, np.float32)
+    pixels: Any = image.pixels
+    if pixels.dtype == np.float32:
+        return pixels
     levels = np.arange(256, dtype=np.float32) / np.float32(255.0)
     decoded = levels
     if image.srgb:
         decoded = np.where(levels <= 0.04045, levels / 12.92, ((levels + 0.055) / 1.055) ** 2.4).astype(np.float32)
-    values = decoded[image.pixels]
-    values[..., 3] = levels[image.pixels[..., 3]]
+    values = decoded[pixels]
+    values[..., 3] = levels[pixels[..., 3]]
     return values
 
 
@@ -214,7 +246,17 @@ def _masked(key: str, color: Image | None, mask: Image, component: str) -> Image
     )
 
 
-def _repeat(values: np.ndarray, height: int, width: int) -> np.ndarray:
+def _premultiply(key: str, image: Image) -> Image:
+    """An opaque image whose colours, as encoded, are multiplied by the alpha they had."""
+    one = np.float32(1.0) if image.pixels.dtype == np.float32 else np.float32(255.0)
+    values = image.pixels.astype(np.float32)
+    values[..., :3] *= values[..., 3:] / one
+    values[..., 3] = one
+    pixels = values if image.pixels.dtype == np.float32 else np.rint(values).astype(np.uint8)
+    return Image(key=key, name=image.name, version=new_version(), pixels=pixels, srgb=image.srgb)
+
+
+def _repeat(values: Any, height: int, width: int) -> Any:
     rows = np.arange(height) * values.shape[0] // height
     columns = np.arange(width) * values.shape[1] // width
     return values[rows[:, None], columns[None, :]]

@@ -8,16 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from operator import add
 
 from ...scene.arrays import Color
-from .expressions import WHITE, Evaluator, Expression, grey, luminance, multiply, reflectance
-from .graph import Groups, Source, find_source
-
-if TYPE_CHECKING:
-    import bpy
+from .expressions import WHITE, Evaluator, Expression, grey, luminance, per_channel, reflectance
+from .graph import Groups, Node, Socket, Source, find_source
 
 BLACK: Color = (0.0, 0.0, 0.0)
+NOTHING = Expression(BLACK)
+EVERYTHING = Expression(WHITE)
 
 
 @dataclass(frozen=True)
@@ -25,16 +24,16 @@ class Surface:
     """Principled constants; `alpha` may read a texture, as may `base_color`. `weight` 0…1 is the share that
     reflects at all (an emission shader has none), used when surfaces are mixed."""
 
-    base_color: Expression = Expression(BLACK)
+    base_color: Expression = NOTHING
     metallic: float = 0.0
     roughness: float = 0.5
     specular: float = 0.0
     emission: Color = BLACK
-    alpha: Expression = Expression(WHITE)
+    alpha: Expression = EVERYTHING
     weight: float = 1.0
 
 
-def evaluate_surface(socket: bpy.types.NodeSocket, groups: Groups, evaluator: Evaluator) -> Surface:
+def evaluate_surface(socket: Socket, groups: Groups, evaluator: Evaluator) -> Surface:
     """The surface that a shader input receives; black where nothing is connected, as in Cycles."""
     source = find_source(socket, groups)
     if source.node is None or source.node.mute:
@@ -50,7 +49,6 @@ class _Inputs:
     """The inputs of one shader node by name, evaluated."""
 
     def __init__(self, source: Source, evaluator: Evaluator) -> None:
-        assert source.node is not None
         self.node = source.node
         self._groups = source.groups
         self._evaluator = evaluator
@@ -120,7 +118,7 @@ def _principled(source: Source, evaluator: Evaluator) -> Surface:
         transmission = inputs.unit("Transmission Weight")
         if transmission > 0.0 and metallic < 1.0:
             evaluator.warn(inputs.node, "transmission is not rendered yet; the surface is shown opaque and dark")
-            base_color = base_color.scaled((1.0 - transmission * (1.0 - metallic),) * 3)
+            base_color = base_color.scaled(1.0 - transmission * (1.0 - metallic))
     specular = reflectance(inputs.value("IOR")) * 2.0 * inputs.value("Specular IOR Level") * luminance(tint)
     return Surface(
         base_color=base_color,
@@ -136,7 +134,7 @@ def _emitted(inputs: _Inputs, color: str, strength: str) -> Color:
     if not inputs.is_used(strength):
         return BLACK
     factor = inputs.value(strength)
-    return BLACK if factor == 0.0 else multiply(inputs.color(color), (factor,) * 3)
+    return BLACK if factor == 0.0 else per_channel(lambda channel: channel * factor, inputs.color(color))
 
 
 def _diffuse(source: Source, evaluator: Evaluator) -> Surface:
@@ -192,17 +190,15 @@ def _transparent(source: Source, evaluator: Evaluator) -> Surface:
     color = inputs.color("Color")
     if color != WHITE:
         evaluator.warn(inputs.node, "coloured transparency is not rendered yet; the surface is fully transparent")
-    return Surface(alpha=Expression(BLACK), weight=0.0)
+    return Surface(alpha=NOTHING, weight=0.0)
 
 
 def _holdout(source: Source, evaluator: Evaluator) -> Surface:
-    assert source.node is not None
     evaluator.warn(source.node, "holdouts are not rendered yet; the surface is fully transparent")
-    return Surface(alpha=Expression(BLACK), weight=0.0)
+    return Surface(alpha=NOTHING, weight=0.0)
 
 
 def _unknown(source: Source, evaluator: Evaluator) -> Surface:
-    assert source.node is not None
     color = next((entry for entry in source.node.inputs if entry.type == "RGBA"), None)
     if color is None:
         return Surface(base_color=grey(0.8))
@@ -210,7 +206,6 @@ def _unknown(source: Source, evaluator: Evaluator) -> Surface:
 
 
 def _mix(source: Source, evaluator: Evaluator) -> Surface:
-    assert source.node is not None
     fraction_socket, *shaders = source.node.inputs[:3]
     first, second = (evaluate_surface(shader, source.groups, evaluator) for shader in shaders)
     fraction = evaluator.expression(fraction_socket, source.groups)
@@ -228,9 +223,9 @@ def _masked(fraction: Expression, first: Surface, second: Surface) -> Surface | 
     """A texture that mixes a surface with nothing is that surface's alpha."""
     if fraction.texture is None or fraction.factor != WHITE:
         return None
-    if _is_nothing(first) and second.alpha == Expression(WHITE):
+    if _is_nothing(first) and second.alpha == EVERYTHING:
         return replace(second, alpha=fraction)
-    if _is_nothing(second) and first.alpha == Expression(WHITE) and fraction.component in _INVERSE:
+    if _is_nothing(second) and first.alpha == EVERYTHING and fraction.component in _INVERSE:
         return replace(first, alpha=replace(fraction, component=_INVERSE[fraction.component]))
     return None
 
@@ -239,30 +234,30 @@ _INVERSE = {"ALPHA": "INVERTED_ALPHA", "INVERTED_ALPHA": "ALPHA"}
 
 
 def _is_nothing(surface: Surface) -> bool:
-    return surface.alpha == Expression(BLACK) and surface.emission == BLACK
+    return surface.alpha == NOTHING and surface.emission == BLACK
 
 
-def _blend(first: Surface, second: Surface, fraction: float, node: bpy.types.Node, evaluator: Evaluator) -> Surface:
-    emission = (a * (1.0 - fraction) + b * fraction for a, b in zip(first.emission, second.emission, strict=True))
+def _blend(first: Surface, second: Surface, fraction: float, node: Node, evaluator: Evaluator) -> Surface:
+    emission = per_channel(lambda a, b: a * (1.0 - fraction) + b * fraction, first.emission, second.emission)
     alphas = [_constant_alpha(surface, node, evaluator) for surface in (first, second)]
     alpha = alphas[0] * (1.0 - fraction) + alphas[1] * fraction
     shares = (alphas[0] * (1.0 - fraction) / alpha, alphas[1] * fraction / alpha) if alpha > 0.0 else (0.5, 0.5)
     blended = _weighted(first, second, shares, node, evaluator)
-    return replace(blended, emission=tuple(emission), alpha=grey(alpha))
+    return replace(blended, emission=emission, alpha=grey(alpha))
 
 
-def _constant_alpha(surface: Surface, node: bpy.types.Node, evaluator: Evaluator) -> float:
+def _constant_alpha(surface: Surface, node: Node, evaluator: Evaluator) -> float:
     return min(max(luminance(evaluator.reduce(surface.alpha, node, "alpha within a mix")), 0.0), 1.0)
 
 
 def _weighted(
-    first: Surface, second: Surface, shares: tuple[float, float], node: bpy.types.Node, evaluator: Evaluator
+    first: Surface, second: Surface, shares: tuple[float, float], node: Node, evaluator: Evaluator
 ) -> Surface:
     """Reflection of two surfaces, each with its share; their emission and alpha are the caller's."""
     weights = shares[0] * first.weight, shares[1] * second.weight
     total = weights[0] + weights[1]
     if total == 0.0:
-        return replace(first, base_color=Expression(BLACK), specular=0.0, weight=0.0)
+        return replace(first, base_color=NOTHING, specular=0.0, weight=0.0)
     parts = weights[0] / total, weights[1] / total
     if min(weights) > 0.0 and (first.metallic, first.roughness) != (second.metallic, second.roughness):
         evaluator.warn(node, "shaders are not mixed exactly; one surface with their averages is shown")
@@ -280,36 +275,31 @@ def _weighted(
 
 
 def _mixed_color(
-    first: Surface, second: Surface, weights: tuple[float, float], node: bpy.types.Node, evaluator: Evaluator
+    first: Surface, second: Surface, weights: tuple[float, float], node: Node, evaluator: Evaluator
 ) -> Expression:
-    scaled = [surface.base_color.scaled((w,) * 3) for surface, w in zip((first, second), weights, strict=True)]
+    scaled = [surface.base_color.scaled(w) for surface, w in zip((first, second), weights, strict=True)]
     if scaled[0].is_constant and scaled[1].is_constant:
-        red, green, blue = (a + b for a, b in zip(scaled[0].factor, scaled[1].factor, strict=True))
-        return Expression((red, green, blue))
-    kept, other = scaled if weights[0] >= weights[1] else reversed(scaled)
-    if kept.is_constant and weights[0] > 0.0 and weights[1] > 0.0:
-        kept, other = other, kept
-    if other.factor != BLACK:
+        return Expression(per_channel(add, scaled[0].factor, scaled[1].factor))
+    textured = [color for color in scaled if not color.is_constant and color.factor != BLACK]
+    kept = max(textured or scaled, key=lambda color: luminance(color.factor))
+    if all(color.factor != BLACK for color in scaled):
         evaluator.warn(node, "a mix with textures is not rendered exactly; one texture alone is shown")
-        return replace(kept, factor=tuple(value / sum(weights) for value in kept.factor)).scaled(
-            (max(weights) + min(weights),) * 3
-        )
+        return kept.scaled(sum(weights) / (weights[0] if kept is scaled[0] else weights[1]))
     return kept
 
 
 def _add(source: Source, evaluator: Evaluator) -> Surface:
-    assert source.node is not None
     first, second = (evaluate_surface(shader, source.groups, evaluator) for shader in source.node.inputs[:2])
-    emission = tuple(a + b for a, b in zip(first.emission, second.emission, strict=True))
+    emission = per_channel(add, first.emission, second.emission)
     if first.weight == 0.0 or second.weight == 0.0:
         kept = second if first.weight == 0.0 else first
         if _is_nothing(first) or _is_nothing(second):
             evaluator.warn(source.node, "additive transparency is not rendered yet; the surface is shown opaque")
-        return replace(kept, emission=emission, alpha=kept.alpha if kept.weight else Expression(WHITE))
+        return replace(kept, emission=emission, alpha=kept.alpha if kept.weight else EVERYTHING)
     evaluator.warn(source.node, "added shaders are not rendered exactly; one surface with their averages is shown")
     blended = _weighted(first, second, (0.5, 0.5), source.node, evaluator)
-    base_color = blended.base_color.scaled((2.0,) * 3)
-    clamped = replace(base_color, factor=tuple(min(value, 1.0) for value in base_color.factor))
+    base_color = blended.base_color.scaled(2.0)
+    clamped = replace(base_color, factor=per_channel(lambda value: min(value, 1.0), base_color.factor))
     return replace(blended, base_color=clamped, specular=min(blended.specular * 2.0, 1.0), emission=emission)
 
 
