@@ -19,7 +19,8 @@ def light_table(lights: tuple[Light, ...], origin: Float64Array) -> Float32Array
 
     0 position, kind · 1 emission axis, radius (m; sun: half angle, rad) · 2 emission, cosine of the spot's half angle
     3 half x axis (m), soft width of the spot in cosines · 4 half y axis (m), shape
-    5 diffuse factor, specular factor, spread slope T = tan h, spread norm T − h (0: emits all around).
+    5 diffuse factor, specular factor; area: spread slope T = tan h, spread norm T − h (0: emits all around);
+      point, spot: whether it is a disk, 0.
     """
     table = np.zeros((len(lights), TEXELS_PER_LIGHT, 4), np.float32)
     for row, light in zip(table, lights, strict=True):
@@ -35,6 +36,8 @@ def light_table(lights: tuple[Light, ...], origin: Float64Array) -> Float32Array
             row[3, :3] = 0.5 * light.size[0] * rotation[:, 0]
             row[4] = (*(0.5 * light.size[1] * rotation[:, 1]), _SHAPE_CODES[light.shape])
         row[5, :2] = (light.diffuse_factor, light.specular_factor)
+        if light.kind in (LightKind.POINT, LightKind.SPOT):
+            row[5, 2] = light.soft_falloff
         if light.kind is LightKind.AREA and light.spread < _FULL_SPREAD:
             half = max(0.5 * light.spread, 1e-3)
             row[5, 2:] = (np.tan(half), np.tan(half) - half)

@@ -32,6 +32,7 @@ class Light:
       POINT, SPOT: radiant intensity, W/sr (before the spot cone); SUN: irradiance on a surface facing it, W/m²;
       AREA: emitted radiance, W/(sr·m²), of the front face.
     `angle` (rad): full cone angle of a spot, full angular diameter of a sun.
+    `soft_falloff`: a point or spot light is a disk that always faces what it lights, not a sphere.
     `blend` 0…1: soft share of the spot's cone. `spread` (rad): full emission angle of an area light, π for all.
     """
 
@@ -42,6 +43,7 @@ class Light:
     emission: Color
     radius: float = 0.0
     angle: float = 0.0
+    soft_falloff: bool = False
     blend: float = 0.0
     shape: AreaShape = AreaShape.RECTANGLE
     size: tuple[float, float] = (0.0, 0.0)

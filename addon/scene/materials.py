@@ -80,4 +80,3 @@ class Material:
     roughness: float = 0.5
     specular: float = 0.04
     emission: Color = (0.0, 0.0, 0.0)
-    backface_culling: bool = False

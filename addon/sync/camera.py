@@ -72,7 +72,7 @@ def viewport_camera(
     overlays lie. `region` is not read: `region_3d` has its shape.
     """
     projection = _matrix(region_3d.window_matrix)
-    pose = rigid_matrix(np.linalg.inv(_matrix(region_3d.view_matrix)))
+    pose = rigid_matrix(_matrix(np.linalg.inv(_matrix(region_3d.view_matrix))))
     window = _window(projection)
     orthographic = _is_orthographic(projection)
     if orthographic and region_3d.view_perspective != "CAMERA":

@@ -99,7 +99,7 @@ def _same_batch(batch: InstanceBatch, matrices: Float64Array, object_index: Int3
 def _repair(matrices: Float64Array, placements: Placements, messages: Messages) -> BoolArray:
     """(N,) which matrices can be used. One that is flat along a single direction (scale 0 on one axis) is made
     very thin instead, in place, so that its normals stay defined."""
-    usable = np.isfinite(matrices).all(axis=(1, 2))
+    usable = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     linear = np.where(usable[:, None, None], matrices[:, :3, :3], 0.0)
     size = np.abs(linear).max(axis=(1, 2))
     normalized = linear / np.maximum(size, 1e-30)[:, None, None]

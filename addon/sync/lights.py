@@ -47,6 +47,7 @@ def read_light(
     if light.type == "AREA":
         return _area_light(light, color, lengths, common)
     radius = light.shadow_soft_size
+    common["soft_falloff"] = light.use_soft_falloff
     emission = _scaled(color, point_intensity(radius, light.normalize))
     if light.type == "SPOT":
         _warn_uneven_cone(key, name, lengths, messages)
@@ -87,7 +88,7 @@ def rigid_matrix(matrix: Float64Array) -> Float64Array:
     z = _unit(matrix[:3, 2], np.array([0.0, 0.0, 1.0]))
     y = matrix[:3, 1] - z * (z @ matrix[:3, 1])
     if np.linalg.norm(y) <= 1e-12 * max(float(np.abs(matrix[:3, :3]).max()), 1e-30):
-        y = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
+        y = np.asarray(np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))]), np.float64)
     y = _unit(y, y)
     rigid = np.eye(4)
     rigid[:3, 0], rigid[:3, 1], rigid[:3, 2], rigid[:3, 3] = np.cross(y, z), y, z, matrix[:3, 3]

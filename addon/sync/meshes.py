@@ -189,7 +189,7 @@ def _build(key: str, name: str, raw: RawMesh) -> MeshRecord:
     triangles = corner_points[raw.triangle_corners] if raw.by_points else raw.triangle_corners
     if not raw.by_points:
         positions = positions[corner_points]
-    finite = np.isfinite(positions).all(axis=1)
+    finite = np.asarray(np.isfinite(positions).all(axis=1))
     if not finite.all():
         positions = np.where(finite[:, None], positions, np.float32(0.0))
         broken = int(len(raw.positions) - np.isfinite(raw.positions).all(axis=1).sum())

@@ -36,6 +36,17 @@ def test_point_light_follows_the_inverse_square_whatever_its_radius(render, heig
     np.testing.assert_allclose(radiance, RHO / np.pi * np.float64([8, 4, 2]) / height**2, rtol=tolerance)
 
 
+@pytest.mark.parametrize("radius", [0.0, 0.5, 2.0])
+def test_soft_falloff_is_a_disk_that_faces_the_surface(render, radius):
+    """A uniform disk of radiance L overhead irradiates by π L sin² of its half angle: I/(d² + r²).
+
+    Koksma's bound: variation of the integrand, below (r/d)² of its mean, times a discrepancy of about 2/N.
+    """
+    light = builders.light(position=(1 / 32, 1 / 32, 2.0), emission=(8, 8, 8), radius=radius, soft_falloff=True)
+    radiance = plane_radiance(render, (light,), 128 if radius else 1)
+    np.testing.assert_allclose(radiance, RHO / np.pi * 8 / (4 + radius**2), rtol=EXACT + (radius / 2) ** 2 / 64)
+
+
 def test_oblique_light_falls_with_the_cosine(render):
     light = builders.light(position=(3.0 + 1 / 32, 1 / 32, 4.0), emission=(25, 25, 25))
     np.testing.assert_allclose(plane_radiance(render, (light,)), RHO / np.pi * 25 / 25 * 0.8, rtol=EXACT)

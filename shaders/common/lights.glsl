@@ -110,10 +110,21 @@ LightSample sample_light(int index, vec3 position, vec2 u)
     if (distance_squared == 0.0)
         return result;
     result.direction = to_light * inversesqrt(distance_squared);
-    float sine_squared = min(axis.w * axis.w / distance_squared, 1.0);
     float cone = 1.0;
     if (kind == LIGHT_SPOT)
         cone = smoothstep(0.0, 1.0, (-dot(result.direction, axis.xyz) - emission.w) / half_x.w);
+    if (factors.z > 0.0) {
+        // A disk that faces the surface (Blender's soft falloff): finite however near, and never cut by it.
+        vec2 p = axis.w * sample_disk(u);
+        float on_disk_squared = distance_squared + dot(p, p);
+        vec3 tangent, bitangent;
+        orthonormal_basis(result.direction, tangent, bitangent);
+        result.direction = (to_light + p.x * tangent + p.y * bitangent) * inversesqrt(on_disk_squared);
+        float cosine = sqrt(distance_squared / on_disk_squared);
+        result.weight = emission.rgb * (cone * cosine / on_disk_squared);
+        return result;
+    }
+    float sine_squared = min(axis.w * axis.w / distance_squared, 1.0);
     result.direction = sample_cone(result.direction, sine_squared, u);
     result.weight = emission.rgb * (cone * cone_flattening(sine_squared) / max(distance_squared, axis.w * axis.w));
     return result;

@@ -154,7 +154,6 @@ def _without_nodes(key: str, material: bpy.types.Material) -> MaterialRecord:
         version=new_version(),
         base_color=(red, green, blue),
         specular=0.0,
-        backface_culling=material.use_backface_culling,
     )
     text = f"Material “{material.name}” has no nodes; a diffuse surface of its viewport colour is shown."
     return MaterialRecord(mirrored, None, (text,))
@@ -172,5 +171,4 @@ def _material(key: str, material: bpy.types.Material, surface: Surface) -> Mater
         roughness=surface.roughness,
         specular=surface.specular,
         emission=surface.emission,
-        backface_culling=material.use_backface_culling,
     )
