@@ -18,6 +18,12 @@ def _before_load(_path: str) -> None:
     _release()
 
 
+@bpy.app.handlers.persistent
+def _job_begins(*_arguments: object) -> None:
+    """F12, an animation or `blender -b` begins."""
+    sessions.begin_job()
+
+
 def _release() -> None:
     viewport.release()
     sessions.release()
@@ -28,13 +34,15 @@ def register() -> None:
     """Make the engine known to Blender."""
     bpy.utils.register_class(DeepGBufferEngine)
     bpy.app.handlers.load_pre.append(_before_load)
-    atexit.register(unregister)  # bpy 4.5 as a module does not end cleanly while a Python engine is registered
+    bpy.app.handlers.render_init.append(_job_begins)
+    atexit.register(unregister)  # bpy 4.5 as a module does not end cleanly while Python classes are registered
 
 
 def unregister() -> None:
     """Free everything, stop the GL thread, and take the engine away."""
     atexit.unregister(unregister)
     bpy.app.handlers.load_pre.remove(_before_load)
+    bpy.app.handlers.render_init.remove(_job_begins)
     _release()
     stop_gl_thread()
     bpy.utils.unregister_class(DeepGBufferEngine)

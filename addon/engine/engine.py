@@ -3,6 +3,7 @@
 
 import logging
 from concurrent.futures import CancelledError
+from typing import Any
 
 import bpy
 
@@ -25,19 +26,23 @@ class DeepGBufferEngine(bpy.types.RenderEngine):
         super().__init__(*args, **keywords)
         self._layers: dict[str, statistics.Measured] = {}
 
-    def update_render_passes(self, scene: bpy.types.Scene, renderlayer: bpy.types.ViewLayer) -> None:
+    def update_render_passes(  # pyright: ignore[reportIncompatibleMethodOverride] - passed by position
+        self, scene: Any = None, renderlayer: Any = None
+    ) -> None:
         """Tell Blender which passes will come."""
         passes.register(self, scene, renderlayer)
 
-    def render(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def render(self, depsgraph: Any) -> None:
         """Render the view layer of `depsgraph`: F12, `blender -b`, or a preview icon."""
         try:
             if self.is_preview:
                 preview.render(self, depsgraph)
             else:
                 self._render_final(depsgraph)
-        except CancelledError:
+        except CancelledError:  # the GL thread was stopped
             return
+        except KeyboardInterrupt:  # Blender would print it and go on with the next frame
+            self._fail(messages.INTERRUPTED)
         except (messages.EngineError, DeviceError, RenderError, ShaderError) as error:
             self._fail(str(error))
         except MemoryError:
@@ -46,39 +51,30 @@ class DeepGBufferEngine(bpy.types.RenderEngine):
             logger.exception("rendering failed")
             self._fail(messages.internal(error))
 
-    def view_update(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+    def view_update(self, context: Any, depsgraph: Any) -> None:
         """Something in the scene or the viewport's settings changed."""
         viewport.update(context, depsgraph)
 
-    def view_draw(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+    def view_draw(self, context: Any, depsgraph: Any) -> None:
         """Paint the viewport."""
         viewport.draw(self, context, depsgraph)
 
-    def _render_final(self, depsgraph: bpy.types.Depsgraph) -> None:
-        session = sessions.final(depsgraph)
-        job = final.FinalRender(self, session)
+    def _render_final(self, depsgraph: Any) -> None:
+        job = final.FinalRender(self, sessions.final(depsgraph))
         scene, layer_name = depsgraph.scene, depsgraph.view_layer.name
         finished = job.run(depsgraph)
         if layer_name in self._layers:  # Persistent Data: the same engine object renders the next frame
             self._layers.clear()
         self._layers[layer_name] = job.measured
         statistics.record(scene.name, list(self._layers.values()))
-        self._warn(session, job.measured.warnings)
+        warnings = job.measured.warnings
         if scene.render.use_multiview:
-            self._warn(session, (messages.STEREO,))
+            warnings += (messages.STEREO,)
         if finished and job.layers:
-            self._warn(session, layer_output.save(depsgraph, job.layers))
-
-    def _warn(self, session: sessions.FinalSession, warnings: tuple[str, ...]) -> None:
-        """Report each warning; in an animation, each once."""
-        if not self.is_animation:
-            session.reported.clear()
-        for text in dict.fromkeys(warnings):
-            if text not in session.reported:
-                session.reported.add(text)
-                self.report({"WARNING"}, text)
+            warnings += layer_output.save(depsgraph, job.layers)
+        for text in sessions.unreported(warnings):
+            self.report({"WARNING"}, text)
 
     def _fail(self, text: str) -> None:
-        """Make F12 show the error, and the operator and the command line fail."""
+        """Make F12 show the error, and the operator fail. (With `error_set` as well it would be shown twice.)"""
         self.report({"ERROR"}, text)
-        self.error_set(text)

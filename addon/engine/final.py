@@ -4,6 +4,7 @@
 import time
 from concurrent.futures import CancelledError
 from contextlib import suppress
+from typing import Any
 
 import bpy
 
@@ -29,7 +30,7 @@ class FinalRender:
         self._session = session
         self._start = time.perf_counter()
 
-    def run(self, depsgraph: bpy.types.Depsgraph, samples: int | None = None) -> bool:
+    def run(self, depsgraph: Any, samples: int | None = None) -> bool:
         """Render the view layer that `depsgraph` evaluates; `measured` and `layers` are filled when it returns.
 
         `samples` overrides the scene's number. Returns False where the user cancelled before there was a picture; a
@@ -59,7 +60,7 @@ class FinalRender:
     def _elapsed(self) -> float:
         return time.perf_counter() - self._start
 
-    def _sync(self, depsgraph: bpy.types.Depsgraph) -> Scene:
+    def _sync(self, depsgraph: Any) -> Scene:
         self._engine.update_stats("", "Reading the scene")
         synced = self._session.mirror.sync(depsgraph)
         self.measured.sync_s = self._elapsed()

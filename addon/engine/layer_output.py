@@ -4,6 +4,7 @@
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import bpy
 
@@ -14,7 +15,7 @@ from . import messages
 Writer = Callable[[Path, Sequence[LayerImages]], None]
 
 
-def save(depsgraph: bpy.types.Depsgraph, layers: Sequence[LayerImages]) -> tuple[str, ...]:
+def save(depsgraph: Any, layers: Sequence[LayerImages]) -> tuple[str, ...]:
     """Write the files that the scene asks for. Returns a message for each that could not be written."""
     ours = depsgraph.scene.deep_gbuffer
     wanted: list[tuple[str, str, Writer]] = []
@@ -26,9 +27,7 @@ def save(depsgraph: bpy.types.Depsgraph, layers: Sequence[LayerImages]) -> tuple
     return tuple(text for text in failures if text)
 
 
-def _write(
-    depsgraph: bpy.types.Depsgraph, item: str, suffix: str, writer: Writer, layers: Sequence[LayerImages]
-) -> str:
+def _write(depsgraph: Any, item: str, suffix: str, writer: Writer, layers: Sequence[LayerImages]) -> str:
     scene = depsgraph.scene
     template = scene.deep_gbuffer.layers_path
     if template.startswith("//") and not bpy.data.filepath:

@@ -8,12 +8,19 @@ class EngineError(RuntimeError):
 
 EMPTY_REGION = "The render region lies outside this view."
 PREPARING = "Deep G-Buffer is preparing the scene."
+INTERRUPTED = "Rendering was interrupted."
 STEREO = "Stereoscopy is not supported: every view shows the picture of the active camera."
 
 
 def no_camera(scene_name: str) -> str:
     """The scene has no active camera."""
     return f"Scene “{scene_name}” has no camera. Add one and make it active: View > Cameras > Set Active Object."
+
+
+def status(progress: str, warnings: tuple[str, ...]) -> str:
+    """A viewport's one line of status: the progress and, where there are any, the first of the warnings."""
+    more = f" (and {len(warnings) - 1} more warnings)" if len(warnings) > 1 else ""
+    return f"{progress} | {warnings[0]}{more}" if warnings else progress
 
 
 def internal(error: BaseException) -> str:

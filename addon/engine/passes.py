@@ -3,6 +3,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, Literal
 
 import bpy
 import numpy as np
@@ -24,7 +25,7 @@ class OutputPass:
     flag: str
     names: tuple[str, str]
     channel_ids: str
-    kind: str
+    kind: Literal["VALUE", "VECTOR", "COLOR"]
 
     @property
     def name(self) -> str:
@@ -53,7 +54,7 @@ def register(engine: bpy.types.RenderEngine, scene: bpy.types.Scene, view_layer:
         engine.register_pass(scene, view_layer, item.name, len(item.channel_ids), item.channel_ids, item.kind)
 
 
-def write(result: bpy.types.RenderResult, images: Mapping[str, Float32Array]) -> None:
+def write(result: Any, images: Mapping[str, Float32Array]) -> None:
     """Fill the passes of `result`, every stereo view alike.
 
     `images` holds (H, W, C) float32 of `result`'s resolution by pass name, row 0 at the bottom.

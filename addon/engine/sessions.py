@@ -18,7 +18,6 @@ class FinalSession:
 
     mirror: Mirror = field(default_factory=Mirror)
     renderer: Renderer | None = None
-    reported: set[str] = field(default_factory=set[str])
 
     def renderer_on(self, device: Device) -> Renderer:
         """The renderer, made on first use. Call inside GL jobs only."""
@@ -35,10 +34,15 @@ class FinalSession:
 
 _final: dict[tuple[int, str], FinalSession] = {}
 _mirrors: dict[tuple[int, str], Mirror] = {}
+_reported: set[str] = set()
+"""Warnings of the render job under way, an animation's every frame included."""
 
 
 def _key(depsgraph: bpy.types.Depsgraph) -> tuple[int, str]:
-    return depsgraph.scene.original.session_uid, depsgraph.view_layer.name
+    scene, view_layer = depsgraph.scene, depsgraph.view_layer
+    assert scene is not None
+    assert view_layer is not None
+    return scene.session_uid, view_layer.name
 
 
 def _forget_deleted(kept: dict[tuple[int, str], FinalSession] | dict[tuple[int, str], Mirror]) -> None:
@@ -65,6 +69,18 @@ def viewport_mirror(depsgraph: bpy.types.Depsgraph) -> Mirror:
 def release_viewport_mirrors() -> None:
     """Forget the scenes that viewports showed; for when no viewport is left."""
     _mirrors.clear()
+
+
+def unreported(warnings: tuple[str, ...]) -> list[str]:
+    """Those of `warnings` that the render job has not reported before; each is taken as reported then."""
+    fresh = [text for text in dict.fromkeys(warnings) if text not in _reported]
+    _reported.update(fresh)
+    return fresh
+
+
+def begin_job() -> None:
+    """A new render job begins: every warning may be reported again."""
+    _reported.clear()
 
 
 def release() -> None:

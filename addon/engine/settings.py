@@ -4,8 +4,6 @@
 from dataclasses import dataclass
 from typing import Any
 
-import bpy
-
 from ..scene import Channel, DebugView, RenderSettings
 
 
@@ -17,7 +15,7 @@ class FinalSettings:
     time_limit: float
 
 
-def _common(scene: bpy.types.Scene) -> dict[str, Any]:
+def _common(scene: Any) -> dict[str, Any]:
     """What the final render and the viewport share."""
     ours = scene.deep_gbuffer
     return {
@@ -32,7 +30,7 @@ def _common(scene: bpy.types.Scene) -> dict[str, Any]:
 
 
 def final(
-    scene: bpy.types.Scene, width: int, height: int, channels: frozenset[Channel], samples: int | None = None
+    scene: Any, width: int, height: int, channels: frozenset[Channel], samples: int | None = None
 ) -> FinalSettings:
     """Settings of a final render of `width` x `height` pixels that delivers `channels`.
 
@@ -50,6 +48,6 @@ def final(
     return FinalSettings(render, ours.time_limit)
 
 
-def viewport(scene: bpy.types.Scene, width: int, height: int) -> RenderSettings:
+def viewport(scene: Any, width: int, height: int) -> RenderSettings:
     """Settings of a viewport of `width` x `height` pixels."""
     return RenderSettings(width=width, height=height, samples=scene.deep_gbuffer.viewport_samples, **_common(scene))

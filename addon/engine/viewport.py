@@ -7,6 +7,7 @@ Blender.
 
 import logging
 from dataclasses import replace
+from typing import Any
 
 import bpy
 
@@ -30,6 +31,8 @@ class Viewport:
         self.presenter = Presenter()
         self._mirror: Mirror | None = None
         self._scene = Scene()
+        self._warnings: tuple[str, ...] = ()
+        self._fault: str | None = None
         self._drawn = -1
 
     @property
@@ -40,11 +43,12 @@ class Viewport:
     def sync(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Read the scene again. A scene in which nothing that viewports show changed is not taken over."""
         mirror = sessions.viewport_mirror(depsgraph)
-        scene = mirror.sync(depsgraph).scene
+        synced = mirror.sync(depsgraph)
+        scene, self._warnings, self._fault = synced.scene, synced.warnings, None
         if mirror is not self._mirror or replace(scene.versions, camera=0) != replace(self._scene.versions, camera=0):
             self._mirror, self._scene = mirror, scene
 
-    def draw(self, engine: bpy.types.RenderEngine, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+    def draw(self, engine: bpy.types.RenderEngine, context: Any, depsgraph: Any) -> None:
         """Ask for the current view and paint the newest picture."""
         if self._mirror is not sessions.viewport_mirror(depsgraph):
             self.sync(depsgraph)
@@ -66,12 +70,19 @@ class Viewport:
         picture, error = self.session.picture, self.session.error
         if picture is not None:
             self.presenter.picture(picture, rectangle)
+        error = self._fault or error
         if error is not None:
             self.presenter.message(error, region)
         elif picture is None:
             self.presenter.message(messages.PREPARING, region)
         else:
-            engine.update_stats("", f"Sample {picture.samples}/{picture.view.settings.samples}")
+            progress = f"Sample {picture.samples}/{picture.view.settings.samples}"
+            engine.update_stats("", messages.status(progress, self._warnings))
+
+    def fail(self, error: Exception) -> None:
+        """Remember a fault of our own until the next sync, to be painted."""
+        logger.error("the viewport failed", exc_info=error)
+        self._fault = messages.internal(error)
 
     def release(self) -> None:
         """Stop rendering and free the GPU data; does not wait for it."""
@@ -82,18 +93,22 @@ class Viewport:
 _viewports: dict[int, Viewport] = {}
 
 
-def update(context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
-    """Blender's data changed: hand a new scene to the region's session."""
-    _viewport(context.region).sync(depsgraph)
+def update(context: Any, depsgraph: bpy.types.Depsgraph) -> None:
+    """Blender's data changed: read it again."""
+    viewport = _viewport(context.region)
+    try:
+        viewport.sync(depsgraph)
+    except Exception as error:  # Blender would print it and go on showing the old scene
+        viewport.fail(error)
 
 
-def draw(engine: bpy.types.RenderEngine, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+def draw(engine: bpy.types.RenderEngine, context: Any, depsgraph: bpy.types.Depsgraph) -> None:
     """Ask for the region's current view, and paint the newest finished picture. Never waits for the GL thread."""
     viewport = _viewport(context.region)
     try:
         viewport.draw(engine, context, depsgraph)
-    except Exception as error:  # Blender would print it at every draw and leave the region empty
-        logger.exception("drawing the viewport failed")
+    except Exception as error:  # Blender would print it and leave the region empty
+        viewport.fail(error)
         viewport.presenter.message(messages.internal(error), context.region)
 
 
@@ -118,9 +133,11 @@ def _viewport(region: bpy.types.Region) -> Viewport:
     return _viewports.setdefault(region.as_pointer(), Viewport())
 
 
-def _frame(context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> Camera | None:
+def _frame(context: Any, depsgraph: Any) -> Camera | None:
     """The scene camera's own picture where the region looks through it, else None."""
-    if context.region_data.view_perspective != "CAMERA":
+    space = context.space_data
+    through_another = space.use_local_camera and space.camera != depsgraph.scene.camera
+    if context.region_data.view_perspective != "CAMERA" or through_another:
         return None
     render = depsgraph.scene.render
     scale = render.resolution_percentage / 100
@@ -141,13 +158,17 @@ def _tick() -> float | None:
     return BUSY_SECONDS if any(viewport.session.busy for viewport in _viewports.values()) else IDLE_SECONDS
 
 
-def _shown_regions() -> dict[int, bpy.types.Region]:
+def _windows() -> list[Any]:
+    """Blender's windows that show a scene of our engine."""
+    windows = [window for manager in bpy.data.window_managers for window in manager.windows]
+    return [window for window in windows if window.scene.render.engine == statistics.ENGINE]
+
+
+def _shown_regions() -> dict[int, Any]:
     """Every region that our engine draws now, by address."""
     return {
         region.as_pointer(): region
-        for manager in bpy.data.window_managers
-        for window in manager.windows
-        if window.scene.render.engine == statistics.ENGINE
+        for window in _windows()
         for area in window.screen.areas
         if area.type == "VIEW_3D" and area.spaces.active.shading.type == "RENDERED"
         for region in area.regions

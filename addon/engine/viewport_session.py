@@ -136,6 +136,7 @@ class ViewportSession:
             self._renderer.begin(view.scene, view.camera, view.settings)
             self._begun = view
         samples = self._renderer.render_sample()
+        device.context.finish()  # else a fast thread would queue samples of views long gone
         complete = samples >= view.settings.samples
         if complete or samples <= ALWAYS_SHOWN or time.monotonic() - self._read_at >= READ_SECONDS:
             self._picture = Picture(self._renderer.read(Channel.COMBINED), view, samples)

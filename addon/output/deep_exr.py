@@ -17,7 +17,7 @@ def write_deep(path: Path, layers: Sequence[Layer]) -> None:
 
     A pixel has as many samples as layers that are not empty there. Raises OSError.
     """
-    present = np.stack([top_down(np.isfinite(layer.depth)) for layer in layers], axis=-1)
+    present = np.isfinite(np.stack([top_down(layer.depth) for layer in layers], axis=-1))
     counts = present.sum(axis=-1, dtype=np.int32)
     planes: dict[str, list[Float32Array]] = {"Z": [layer.depth for layer in layers]}
     planes |= {letter: [layer.radiance[..., index] for layer in layers] for index, letter in enumerate("RGB")}
@@ -31,15 +31,12 @@ def write_deep(path: Path, layers: Sequence[Layer]) -> None:
 
 
 def _per_pixel(samples: Float32Array, counts: Int32Array) -> np.ndarray:
-    """(H, W) object array of each pixel's samples (count,) float32, None where there are none, as OpenEXR takes it.
+    """(H, W) object array of each pixel's samples (count,) float32, some of them empty, as OpenEXR takes it.
 
     `samples` holds all pixels' samples one after another, in C order of `counts` (H, W).
     """
     samples = samples.astype(np.float32, copy=False)
-    ends = np.cumsum(counts, axis=None)
+    ends = np.cumsum(counts, axis=None).tolist()
     pixels = np.empty(counts.size, dtype=object)
-    starts = (ends - counts.ravel()).tolist()
-    pixels[:] = [
-        samples[first:last] if last > first else None for first, last in zip(starts, ends.tolist(), strict=True)
-    ]
+    pixels[:] = [samples[first:last] for first, last in zip([0, *ends], ends, strict=False)]
     return pixels.reshape(counts.shape)

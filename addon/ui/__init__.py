@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Settings, panels, operators and presets."""
 
+import atexit
 from pathlib import Path
 
 import bpy
@@ -18,10 +19,12 @@ def register() -> None:
         bpy.utils.register_class(cls)
     bpy.utils.register_preset_path(_PRESET_ROOT)
     standard_panels.register()
+    atexit.register(unregister)  # bpy 4.5 as a module does not end cleanly while Python classes are registered
 
 
 def unregister() -> None:
     """Take everything away again."""
+    atexit.unregister(unregister)
     standard_panels.unregister()
     bpy.utils.unregister_preset_path(_PRESET_ROOT)
     for cls in reversed(_CLASSES):

@@ -2,7 +2,7 @@
 """Operators: statistics to the clipboard, sampling presets."""
 
 import json
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import bpy
 from bl_operators.presets import AddPresetBase
@@ -19,17 +19,17 @@ class DEEP_GBUFFER_OT_copy_statistics(bpy.types.Operator):
     bl_label = "Copy Statistics"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Any) -> bool:
         """Only after a final render."""
         return statistics.last(context.scene.name) is not None
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Any) -> Any:
         """Copy."""
         context.window_manager.clipboard = json.dumps(statistics.last(context.scene.name), indent=2)
         return {"FINISHED"}
 
 
-class DEEP_GBUFFER_OT_sampling_preset_add(AddPresetBase, bpy.types.Operator):
+class DEEP_GBUFFER_OT_sampling_preset_add(AddPresetBase, bpy.types.Operator):  # pyright: ignore[reportIncompatibleMethodOverride]
     """Add or remove a sampling preset"""
 
     bl_idname = "deep_gbuffer.sampling_preset_add"

@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The engine's own panels."""
 
-from typing import ClassVar
+from typing import Any
 
 import bpy
 from bl_ui.utils import PresetPanel
 
 from ..engine import passes, statistics
 from .operators import PRESET_FOLDER, DEEP_GBUFFER_OT_copy_statistics, DEEP_GBUFFER_OT_sampling_preset_add
+
+CLOSED: Any = {"DEFAULT_CLOSED"}
+"""Panels that start folded."""
 
 
 class _EnginePanel:
@@ -16,13 +19,14 @@ class _EnginePanel:
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_context = "render"
+    layout: Any
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Any) -> bool:
         """Whether the scene renders with our engine."""
         return context.engine == statistics.ENGINE
 
-    def _column(self) -> bpy.types.UILayout:
+    def _column(self) -> Any:
         """A column in Blender's usual two-column style."""
         self.layout.use_property_split = True
         self.layout.use_property_decorate = False
@@ -43,11 +47,11 @@ class DEEP_GBUFFER_PT_sampling(_EnginePanel, bpy.types.Panel):
 
     bl_label = "Sampling"
 
-    def draw_header_preset(self, _context: bpy.types.Context) -> None:
+    def draw_header_preset(self, context: Any) -> None:
         """The presets menu."""
         DEEP_GBUFFER_PT_sampling_presets.draw_panel_header(self.layout)
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Any) -> None:
         """Samples, time, seed."""
         settings = context.scene.deep_gbuffer
         column = self._column()
@@ -63,7 +67,7 @@ class DEEP_GBUFFER_PT_layers(_EnginePanel, bpy.types.Panel):
 
     bl_label = "Deep G-Buffer"
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Any) -> None:
         """Layers and their separation."""
         settings = context.scene.deep_gbuffer
         column = self._column()
@@ -77,9 +81,9 @@ class DEEP_GBUFFER_PT_film(_EnginePanel, bpy.types.Panel):
     """Pixel filter and background."""
 
     bl_label = "Film"
-    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+    bl_options = CLOSED
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Any) -> None:
         """Blender's own film settings."""
         column = self._column()
         column.prop(context.scene.render, "filter_size")
@@ -90,9 +94,9 @@ class DEEP_GBUFFER_PT_debug_view(_EnginePanel, bpy.types.Panel):
     """One channel of the deep G-buffer instead of the picture."""
 
     bl_label = "Debug View"
-    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+    bl_options = CLOSED
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Any) -> None:
         """Channel and layer."""
         settings = context.scene.deep_gbuffer
         column = self._column()
@@ -107,9 +111,9 @@ class DEEP_GBUFFER_PT_layer_output(_EnginePanel, bpy.types.Panel):
 
     bl_label = "Layer Output"
     bl_context = "output"
-    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+    bl_options = CLOSED
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Any) -> None:
         """Which files, and where."""
         settings = context.scene.deep_gbuffer
         column = self._column()
@@ -126,7 +130,7 @@ class DEEP_GBUFFER_PT_view_layer_passes(_EnginePanel, bpy.types.Panel):
     bl_label = "Passes"
     bl_context = "view_layer"
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Any) -> None:
         """One box per pass of the table."""
         column = self._column()
         for item in passes.PASSES:
@@ -138,9 +142,9 @@ class DEEP_GBUFFER_PT_statistics(_EnginePanel, bpy.types.Panel):
     """What the last final render did and cost."""
 
     bl_label = "Statistics"
-    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+    bl_options = CLOSED
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Any) -> None:
         """Times, passes, passes left out with the reason, and memory."""
         last = statistics.last(context.scene.name)
         if last is None:
@@ -164,7 +168,7 @@ TIMES = (
 )
 
 
-def _table(layout: bpy.types.UILayout, title: str, rows: list[tuple[str, str]]) -> None:
+def _table(layout: Any, title: str, rows: list[tuple[str, str]]) -> None:
     if not rows:
         return
     box = layout.box().column(align=True)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The scene's settings of the engine: `Scene.deep_gbuffer`."""
 
+from typing import Any
+
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
@@ -8,6 +10,7 @@ from ..engine import viewport
 from ..scene import DebugView
 from ..scene.settings import MAXIMUM_LAYERS
 
+_SCENE: Any = bpy.types.Scene  # takes properties that its type does not name
 DEBUG_ITEMS = [
     (DebugView.NONE.value, "Rendered", "The finished picture"),
     (DebugView.DEPTH.value, "Depth", "Distance from the camera plane"),
@@ -121,10 +124,10 @@ class DeepGBufferSettings(bpy.types.PropertyGroup):
 def register() -> None:
     """Give scenes their settings."""
     bpy.utils.register_class(DeepGBufferSettings)
-    bpy.types.Scene.deep_gbuffer = bpy.props.PointerProperty(type=DeepGBufferSettings)
+    _SCENE.deep_gbuffer = bpy.props.PointerProperty(type=DeepGBufferSettings)
 
 
 def unregister() -> None:
     """Take the settings away."""
-    del bpy.types.Scene.deep_gbuffer
+    del _SCENE.deep_gbuffer
     bpy.utils.unregister_class(DeepGBufferSettings)

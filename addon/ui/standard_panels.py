@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Blender's own panels that make sense with this engine."""
 
+from typing import Any
+
 import bpy
 
 from ..engine import statistics
@@ -21,11 +23,15 @@ INCLUDED = {
 """Panels that name other engines only, but whose settings we read."""
 
 
-def _suitable() -> list[type[bpy.types.Panel]]:
-    panels = [panel for panel in bpy.types.Panel.__subclasses__() if hasattr(panel, "COMPAT_ENGINES")]
+def _panels() -> list[Any]:
+    """Every panel class that says which engines it is for."""
+    return [panel for panel in bpy.types.Panel.__subclasses__() if hasattr(panel, "COMPAT_ENGINES")]
+
+
+def _suitable() -> list[Any]:
     return [
         panel
-        for panel in panels
+        for panel in _panels()
         if panel.__name__ in INCLUDED
         or (
             "BLENDER_RENDER" in panel.COMPAT_ENGINES
@@ -43,6 +49,5 @@ def register() -> None:
 
 def unregister() -> None:
     """Hide them again; they are as they were before."""
-    for panel in bpy.types.Panel.__subclasses__():
-        if hasattr(panel, "COMPAT_ENGINES"):
-            panel.COMPAT_ENGINES.discard(statistics.ENGINE)
+    for panel in _panels():
+        panel.COMPAT_ENGINES.discard(statistics.ENGINE)

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One run of a real Blender window; the tests look at what it left."""
+
+import json
+import shutil
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tooling import blender_window, packaging
+
+HERE = Path(__file__).parent
+TIMEOUT_SECONDS = 300
+PREFERENCES = "import bpy; bpy.context.preferences.view.show_splash = False; bpy.ops.wm.save_userpref()"
+
+
+@pytest.fixture(scope="session", name="window_blender")
+def window_blender_fixture() -> Path:
+    """Root of the chroot with a Blender that can open a window; skips where there is none."""
+    root = blender_window.locate()
+    if root is None:
+        pytest.skip(f"NOT TESTED: no Blender window. {blender_window.why_not()}")
+    return root
+
+
+class WindowRun:
+    """What a window session left: results.json and pictures."""
+
+    def __init__(self, folder: Path, output: str) -> None:
+        self.output = output
+        self._folder = folder
+        path = folder / "results.json"
+        self.results = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+
+    def viewport(self, name: str, index: int = 0) -> np.ndarray:
+        """One viewport of a screenshot, (H, W, 3) float 0…1, row 0 at the top."""
+        left, top, width, height = self.results[name][index]
+        return self._image(name)[top : top + height, left : left + width, :3]
+
+    def final(self, name: str) -> np.ndarray:
+        """A final render as Blender saved it, like `viewport`."""
+        return self._image(f"{name}_final")[..., :3]
+
+    def coverage(self, name: str) -> np.ndarray:
+        """Alpha (H, W) of that final render."""
+        return self._image(f"{name}_final")[..., 3]
+
+    def _image(self, name: str) -> np.ndarray:
+        with Image.open(self._folder / f"{name}.png") as image:
+            return np.asarray(image.convert("RGBA"), np.float32) / 255.0
+
+
+@pytest.fixture(scope="session", name="window")
+def window_fixture(window_blender: Path, tmp_path_factory: pytest.TempPathFactory) -> WindowRun:
+    """The scenario of driver.py, run once with a scratch profile and the built zip."""
+    kept = tmp_path_factory.mktemp("window")
+    (window_blender / "var/tmp").mkdir(parents=True, exist_ok=True)
+    folder = Path(tempfile.mkdtemp(prefix="deep_gbuffer_", dir=window_blender / "var/tmp"))
+    try:
+        inside = Path("/") / folder.relative_to(window_blender)
+        shutil.move(packaging.for_this_machine(kept, packaging.extension_tool()), folder / "extension.zip")
+        for name in ("driver.py", "xvfb.py"):
+            shutil.copy(HERE / name, folder)
+        env = {"LIBGL_ALWAYS_SOFTWARE": "1", "HOME": str(inside), "BLENDER_USER_RESOURCES": str(inside / "profile")}
+        blender_window.run(
+            window_blender, ["blender", "--background", "--python-expr", PREFERENCES], env, TIMEOUT_SECONDS
+        )
+        command = ["python3", inside / "xvfb.py", "blender", "--python", inside / "driver.py", "--", inside]
+        done = blender_window.run(window_blender, [str(item) for item in command], env, TIMEOUT_SECONDS)
+        for path in [*folder.glob("*.png"), *folder.glob("*.json")]:
+            shutil.copy(path, kept)
+        return WindowRun(kept, done.stdout)
+    finally:
+        shutil.rmtree(folder)
