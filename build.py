@@ -63,7 +63,9 @@ def command_line() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="build.py", description=__doc__)
     verbs = parser.add_subparsers(required=True, metavar="VERB")
 
-    render = verbs.add_parser("render", help="render a .blend", description="Render a .blend with any engine.")
+    render = verbs.add_parser(
+        "render", help="render a .blend", description="Render a .blend with any engine, or a scene snapshot (.npz)."
+    )
     render.set_defaults(verb=rendering.render)
     render.add_argument("file", metavar="FILE.blend")
     render.add_argument(

@@ -18,6 +18,8 @@ from tooling import environments, packaging, places
 from tooling.console import INTERRUPTED, MARK, TAIL_LINES, Progress, ToolError, say, stop, warn
 
 JOB = places.REPOSITORY / "tooling" / "render_job.py"
+SNAPSHOT_JOB = places.REPOSITORY / "tooling" / "snapshot_job.py"
+SNAPSHOT_SUFFIX = ".npz"
 SUFFIXES = (".png", ".exr")
 FRAME_DIGITS = 4
 ANY_WRITE_BIT = 0o222
@@ -37,10 +39,11 @@ def _digits(frame: int, width: int) -> str:
     return f"{'-' if frame < 0 else ''}{abs(frame):0{width}d}"
 
 
-def default_output(blend: Path, engine: str) -> Path:
-    """Where the picture goes without -o: beside the .blend, or into the current folder where that cannot be written."""
-    folder = blend.parent if is_writable(blend.parent) else Path.cwd()
-    return folder / f"{blend.stem}_{engine.lower()}.png"
+def default_output(source: Path, engine: str) -> Path:
+    """Where the picture goes without -o: beside the file, or into the current folder where that cannot be written."""
+    folder = source.parent if is_writable(source.parent) else Path.cwd()
+    suffix = ".exr" if source.suffix == SNAPSHOT_SUFFIX else ".png"
+    return folder / f"{source.stem}_{engine.lower()}{suffix}"
 
 
 def is_writable(folder: Path) -> bool:
@@ -67,16 +70,28 @@ def blender_command(choice: str | None) -> tuple[list[str], bool]:
     return [path, "--background", "--python-exit-code", "1", "--python", str(JOB), "--"], True
 
 
+def snapshot_command(options: Namespace, output: Path) -> list[str]:
+    """The command that renders a snapshot without Blender. Raises ToolError for what only a Blender can do."""
+    if options.engine != "DEEP_GBUFFER" or options.blender or options.frames or options.frame is not None:
+        raise ToolError("A snapshot is one frame for our own engine: no --engine, --blender, --frame or --frames.")
+    if output.suffix != ".exr":
+        raise ToolError(f"{output}: a snapshot has no view transform, so its picture is written as .exr.")
+    return [str(environments.development_python()), "-P", str(SNAPSHOT_JOB), "--"]
+
+
 def render(options: Namespace) -> int:
     """Run the verb with the parsed command line; the exit code. Raises ToolError with the reason of any failure."""
-    blend = Path(options.file).resolve()
-    if not blend.is_file():
+    source = Path(options.file).resolve()
+    if not source.is_file():
         raise ToolError(f"{options.file}: no such file.")
-    output = Path(options.output).resolve() if options.output else default_output(blend, options.engine)
+    output = Path(options.output).resolve() if options.output else default_output(source, options.engine)
     check_output(output)
     if options.stats and not Path(options.stats).resolve().parent.is_dir():
         raise ToolError(f"{options.stats}: its folder does not exist.")
-    command, real = blender_command(options.blender)
+    if source.suffix == SNAPSHOT_SUFFIX:
+        command, real = snapshot_command(options, output), False
+    else:
+        command, real = blender_command(options.blender)
     with tempfile.TemporaryDirectory(prefix="deep_gbuffer_") as scratch:
         extension = None
         if real and options.engine == "DEEP_GBUFFER":
@@ -84,7 +99,7 @@ def render(options: Namespace) -> int:
             extension = str(packaging.for_this_machine(Path(scratch) / "extension", tool))
         frames = options.frames or ([options.frame] if options.frame is not None else None)
         job = {
-            "file": str(blend),
+            "file": str(source),
             "engine": options.engine,
             "frames": frames,
             "resolution": options.resolution,

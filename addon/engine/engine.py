@@ -70,8 +70,8 @@ class DeepGBufferEngine(bpy.types.RenderEngine):
         warnings = job.measured.warnings
         if scene.render.use_multiview:
             warnings += (messages.STEREO,)
-        if finished and job.layers:
-            warnings += layer_output.save(depsgraph, job.layers)
+        if finished:
+            warnings += layer_output.save(depsgraph, job.scene, job.layers)
         for text in sessions.unreported(warnings):
             self.report({"WARNING"}, text)
 

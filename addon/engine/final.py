@@ -25,20 +25,21 @@ class FinalRender:
 
     def __init__(self, engine: bpy.types.RenderEngine, session: FinalSession) -> None:
         self.measured = Measured()
+        self.scene = Scene()
         self.layers: tuple[LayerImages, ...] = ()
         self._engine = engine
         self._session = session
         self._start = time.perf_counter()
 
     def run(self, depsgraph: Any, samples: int | None = None) -> bool:
-        """Render the view layer that `depsgraph` evaluates; `measured` and `layers` are filled when it returns.
+        """Render the view layer that `depsgraph` evaluates.
 
-        `samples` overrides the scene's number. Returns False where the user cancelled before there was a picture; a
-        render cancelled later keeps the samples it has. Raises EngineError, DeviceError, RenderError or ShaderError
-        where there can be no picture.
+        `measured`, `scene` and `layers` are filled when it returns. `samples` overrides the scene's number. Returns
+        False where the user cancelled before there was a picture; a render cancelled later keeps the samples it has.
+        Raises EngineError, DeviceError, RenderError or ShaderError where there can be no picture.
         """
         engine = self._engine
-        scene = self._sync(depsgraph)
+        scene = self.scene = self._sync(depsgraph)
         camera = render_camera(depsgraph, engine.resolution_x, engine.resolution_y)
         if camera is None:
             raise messages.EngineError(messages.no_camera(depsgraph.scene.name))

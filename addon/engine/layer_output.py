@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the layers of a final render are saved, and saving them."""
+"""Where the layers and the scene of a final render are saved, and saving them."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -10,24 +10,23 @@ import bpy
 
 from .. import output
 from ..render import LayerImages
+from ..scene import Scene, snapshot
 from . import messages
 
-Writer = Callable[[Path, Sequence[LayerImages]], None]
 
-
-def save(depsgraph: Any, layers: Sequence[LayerImages]) -> tuple[str, ...]:
+def save(depsgraph: Any, scene: Scene, layers: Sequence[LayerImages]) -> tuple[str, ...]:
     """Write the files that the scene asks for. Returns a message for each that could not be written."""
     ours = depsgraph.scene.deep_gbuffer
-    wanted: list[tuple[str, str, Writer]] = []
-    if ours.save_layers:
-        wanted.append(("layers", "layers", output.write_layers))
-    if ours.save_deep:
-        wanted.append(("deep samples", "deep", output.write_deep))
-    failures = (_write(depsgraph, item, suffix, writer, layers) for item, suffix, writer in wanted)
+    wanted: tuple[tuple[bool, str, str, Callable[[Path], None]], ...] = (
+        (ours.save_layers, "layers", "layers.exr", lambda path: output.write_layers(path, layers)),
+        (ours.save_deep, "deep samples", "deep.exr", lambda path: output.write_deep(path, layers)),
+        (ours.save_snapshot, "scene snapshot", "snapshot.npz", lambda path: snapshot.save(path, scene)),
+    )
+    failures = (_write(depsgraph, item, ending, write) for asked, item, ending, write in wanted if asked)
     return tuple(text for text in failures if text)
 
 
-def _write(depsgraph: Any, item: str, suffix: str, writer: Writer, layers: Sequence[LayerImages]) -> str:
+def _write(depsgraph: Any, item: str, ending: str, write: Callable[[Path], None]) -> str:
     scene = depsgraph.scene
     template = scene.deep_gbuffer.layers_path
     if template.startswith("//") and not bpy.data.filepath:
@@ -35,20 +34,20 @@ def _write(depsgraph: Any, item: str, suffix: str, writer: Writer, layers: Seque
     several = sum(layer.use for layer in scene.original.view_layers) > 1
     layer_name = depsgraph.view_layer.name if several else ""
     stem = Path(bpy.data.filepath).stem or "untitled"
-    path = Path(bpy.path.abspath(file_name(template, stem, scene.frame_current, layer_name, suffix)))
+    path = Path(bpy.path.abspath(file_name(template, stem, scene.frame_current, layer_name, ending)))
     try:
-        writer(path, layers)
+        write(path)
     except OSError as error:
         return messages.not_written(item, str(path), error)
     return ""
 
 
-def file_name(template: str, blend_name: str, frame: int, view_layer: str, suffix: str) -> str:
+def file_name(template: str, blend_name: str, frame: int, view_layer: str, ending: str) -> str:
     """The path of one file, by Blender's conventions for its own output path.
 
     A run of # is the frame number, padded to its length; without one, four digits are appended. A path that is a
     folder (it ends with a slash) takes the .blend's name. An ending .exr is dropped before, and
-    "_VIEWLAYER" (where given) and "_SUFFIX.exr" come after.
+    "_VIEWLAYER" (where given) and "_ENDING" come after.
     """
     path = template.removesuffix(".exr")
     if path.endswith(("/", "\\")):
@@ -62,4 +61,4 @@ def file_name(template: str, blend_name: str, frame: int, view_layer: str, suffi
     else:
         name += f"{frame:04d}"
     layer = f"_{re.sub(r'[^0-9A-Za-z._-]', '_', view_layer)}" if view_layer else ""
-    return f"{folder}{name}{layer}_{suffix}.exr"
+    return f"{folder}{name}{layer}_{ending}"

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The deep G-buffer's layers as files: a multi-layer EXR and a deep EXR."""
+"""Pictures and the deep G-buffer's layers as EXR files."""
 
 from .deep_exr import write_deep
+from .exr import write_channels
 from .layers_exr import write_layers
 
-__all__ = ["write_deep", "write_layers"]
+__all__ = ["write_channels", "write_deep", "write_layers"]

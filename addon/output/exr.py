@@ -5,6 +5,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import OpenEXR
 
 from ..scene.arrays import Float32Array
@@ -25,6 +26,13 @@ def write_atomically(path: Path, header: dict[str, Any], channels: dict[str, Any
         raise OSError(f"OpenEXR could not write {path}: {error}") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def write_channels(path: Path, channels: dict[str, Float32Array]) -> None:
+    """Write named images (H, W) float32, row 0 at the bottom, as the channels of one scanline EXR. Raises OSError."""
+    header = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION}
+    planes = {name: np.ascontiguousarray(top_down(image), np.float32) for name, image in channels.items()}
+    write_atomically(path, header, planes)
 
 
 def top_down(image: Float32Array) -> Float32Array:

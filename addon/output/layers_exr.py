@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-import OpenEXR
 
 from ..scene.arrays import Float32Array
-from .exr import top_down, write_atomically
+from .exr import write_channels
 
 
 class Layer(Protocol):
@@ -56,15 +55,10 @@ def write_layers(path: Path, layers: Sequence[Layer]) -> None:
     channels: dict[str, Float32Array] = {}
     for index, layer in enumerate(layers):
         depth = np.where(np.isfinite(layer.depth), layer.depth, np.float32(1e10)).astype(np.float32)
-        channels[f"layer{index}.Depth.Z"] = _plane(depth)
+        channels[f"layer{index}.Depth.Z"] = depth
         for name, attribute, letters in CHANNELS:
             image = getattr(layer, attribute)
             planes = image[..., None] if image.ndim == 2 else image
             for channel, letter in enumerate(letters):
-                channels[f"layer{index}.{name}.{letter}"] = _plane(planes[..., channel])
-    header = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION}
-    write_atomically(path, header, channels)
-
-
-def _plane(image: Float32Array) -> Float32Array:
-    return np.ascontiguousarray(top_down(image), dtype=np.float32)
+                channels[f"layer{index}.{name}.{letter}"] = planes[..., channel]
+    write_channels(path, channels)

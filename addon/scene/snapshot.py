@@ -5,6 +5,7 @@ A snapshot saved on a machine with Blender renders on one without.
 """
 
 import json
+import os
 import types
 import typing
 from collections.abc import Mapping
@@ -26,12 +27,19 @@ class SnapshotError(ValueError):
 
 
 def save(path: str | Path, scene: Scene) -> None:
-    """Write a scene to `path`. Raises OSError naming the file where that fails."""
+    """Write a scene to `path`, never half of it; makes the folder. Raises OSError naming the file where that fails."""
     arrays: dict[str, np.ndarray[Any, Any]] = {}
     description = {"format": FORMAT_VERSION, "scene": _describe(scene, arrays)}
     arrays[_HEADER] = np.frombuffer(json.dumps(description).encode(), np.uint8)
-    with Path(path).open("wb") as file:
-        np.savez_compressed(file, allow_pickle=False, **arrays)
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draft = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        with draft.open("wb") as file:
+            np.savez_compressed(file, allow_pickle=False, **arrays)
+        draft.replace(path)
+    finally:
+        draft.unlink(missing_ok=True)
 
 
 def load(path: str | Path) -> Scene:

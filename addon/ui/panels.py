@@ -119,8 +119,9 @@ class DEEP_GBUFFER_PT_layer_output(_EnginePanel, bpy.types.Panel):
         column = self._column()
         column.prop(settings, "save_layers")
         column.prop(settings, "save_deep")
+        column.prop(settings, "save_snapshot")
         path = column.column()
-        path.active = settings.save_layers or settings.save_deep
+        path.active = settings.save_layers or settings.save_deep or settings.save_snapshot
         path.prop(settings, "layers_path", text="Path")
 
 

@@ -112,9 +112,15 @@ class DeepGBufferSettings(bpy.types.PropertyGroup):
         "per layer and pixel, for deep compositing",
         default=False,
     )
+    save_snapshot: BoolProperty(
+        name="Scene Snapshot",
+        description="Write the scene as plain arrays (.npz) after a final render; build.py renders it on machines "
+        "without Blender",
+        default=False,
+    )
     layers_path: StringProperty(
         name="Layer Output Path",
-        description="Where layer files are written. # stands for a digit of the frame number, // for the folder of "
+        description="Where these files are written. # stands for a digit of the frame number, // for the folder of "
         "the .blend; a folder takes the .blend's name",
         default="//",
         subtype="FILE_PATH",

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Layer files: what is written is what is read back, and what cannot be written is said."""
 
+import json
+import subprocess
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -124,7 +127,7 @@ def test_a_file_that_cannot_be_written_leaves_the_old_one_and_no_scrap(tmp_path,
     ],
 )
 def test_file_names_follow_blenders_conventions(template, view_layer, expected):
-    assert file_name(template, "shot", 7, view_layer, "layers") == expected
+    assert file_name(template, "shot", 7, view_layer, "layers.exr") == expected
 
 
 def test_a_render_saves_both_files(plane_scene, tmp_path):
@@ -143,6 +146,30 @@ def test_a_render_saves_both_files(plane_scene, tmp_path):
         depths = file.channels()["Z"].pixels
     np.testing.assert_allclose(depths[row, left], (5.0, 7.0), rtol=1e-5)
     np.testing.assert_allclose(depths[row, right], (7.0,), rtol=1e-5)
+
+
+def test_a_scene_snapshot_renders_the_same_picture_without_blender(plane_scene, tmp_path):
+    """The job that build.py runs for a .npz, in a process that cannot import bpy; same bits as Blender's result."""
+    plane_scene.deep_gbuffer.save_snapshot = True
+    plane_scene.deep_gbuffer.layers_path = f"{tmp_path}/shot_"
+    expected = render(plane_scene, tmp_path)["ViewLayer.Combined"]
+    job = {
+        "file": str(tmp_path / "shot_0001_snapshot.npz"),
+        "resolution": [plane_scene.render.resolution_x, plane_scene.render.resolution_y],
+        "samples": plane_scene.deep_gbuffer.samples,
+        "set": [["layers", "3"], ["filter_radius", str(plane_scene.render.filter_size)]],
+        "time_limit": None,
+        "repeat": 1,
+        "scratch": str(tmp_path),
+    }
+    code = "import runpy, sys; sys.modules['bpy'] = None; runpy.run_path(sys.argv[1], run_name='__main__')"
+    script = str(Path(__file__).parents[2] / "tooling" / "snapshot_job.py")
+    done = subprocess.run(
+        [sys.executable, "-c", code, script, "--", json.dumps(job)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    picture = planes(tmp_path / "picture.exr")
+    np.testing.assert_array_equal(np.stack([picture[letter] for letter in "RGBA"], axis=-1), expected)
 
 
 def test_a_folder_that_cannot_be_made_is_a_warning_that_names_it(plane_scene, tmp_path, capfd):

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Render a scene snapshot (.npz) with `addon.render` alone; runs without Blender.
+
+Takes the same job and sends the same messages as `render_job`.
+"""
+
+import json
+import signal
+import sys
+import time
+from concurrent.futures import Future, wait
+from dataclasses import fields, replace
+from pathlib import Path
+from statistics import median
+from typing import Any, TypeVar
+
+sys.path.append(str(Path(__file__).resolve().parent.parent))
+
+from addon.output import write_channels
+from addon.render import Device, DeviceError, Renderer, RenderError, ShaderError, gl_thread, stop_gl_thread
+from addon.scene import Camera, Channel, RenderSettings, Scene, snapshot
+from tooling.console import INTERRUPTED, MARK
+from tooling.engine_settings import FALSE, TRUE
+
+T = TypeVar("T")
+
+DEFAULT_RESOLUTION = (1920, 1080)
+FIXED = {"width", "height", "channels", "deep_output"}
+
+
+class JobError(RuntimeError):
+    """A reason why there is no picture; its text is the whole message."""
+
+
+def send(kind: str, content: object) -> None:
+    """Tell the parent something."""
+    print(MARK + json.dumps({"kind": kind, "content": content}), flush=True)
+
+
+def settings_of(job: dict[str, Any]) -> RenderSettings:
+    """The render settings of a job. Raises JobError naming what cannot be set."""
+    width, height = job["resolution"] or DEFAULT_RESOLUTION
+    settings = RenderSettings(width, height, samples=job["samples"] or RenderSettings(1, 1).samples)
+    known = {field.name: type(getattr(settings, field.name)) for field in fields(settings) if field.name not in FIXED}
+    for name, text in job["set"]:
+        if name not in known:
+            raise JobError(f"A snapshot has no setting {name!r}; it has {', '.join(sorted(known))}.")
+        try:
+            settings = replace(settings, **{name: parse(known[name], text)})
+        except ValueError as error:
+            raise JobError(f"{name}: {error}") from error
+    return settings
+
+
+def parse(kind: type, text: str) -> object:
+    """The value of type `kind` (bool, int, float or a string enumeration) that `text` means. Raises ValueError."""
+    if kind is bool:
+        if text.lower() not in TRUE | FALSE:
+            raise ValueError(f"true or false, not {text!r}")
+        return text.lower() in TRUE
+    return kind(text)
+
+
+def finished(future: "Future[T]") -> T:
+    """The result of a job on the GL thread; a signal is handled while waiting."""
+    while not future.done():
+        wait([future], timeout=0.1)
+    return future.result()
+
+
+def render(scene: Scene, camera: Camera, settings: RenderSettings, time_limit: float) -> dict[str, Any]:
+    """Render once; statistics with the key `picture`, (H, W, 4) float32, beside those of the engine."""
+    started = time.perf_counter()
+    samples: list[float] = []
+
+    def elapsed() -> float:
+        return time.perf_counter() - started
+
+    def begin(device: Device) -> Renderer:
+        renderer = Renderer(device)
+        renderer.begin(scene, camera, settings)
+        return renderer
+
+    def sample(device: Device) -> int:
+        done = renderer.render_sample()
+        device.context.finish()
+        return done
+
+    renderer = finished(gl_thread().submit(begin))
+    first_picture = 0.0
+    while len(samples) < settings.samples and not (samples and time_limit and elapsed() >= time_limit):
+        start = time.perf_counter()
+        done = finished(gl_thread().submit(sample))
+        samples.append(time.perf_counter() - start)
+        first_picture = first_picture or elapsed()
+        send("progress", f"Sample {done}/{settings.samples}")
+    picture = finished(gl_thread().submit(lambda _device: renderer.read(Channel.COMBINED)))
+    total = elapsed()
+    measured = finished(gl_thread().submit(lambda _device: renderer.statistics()))
+    finished(gl_thread().submit(lambda _device: renderer.release()))
+    return {
+        "picture": picture,
+        "sync_s": None,
+        "upload_s": measured.upload_s,
+        "first_picture_s": first_picture,
+        "sample_s": median(samples[1:] or samples),
+        "total_s": total,
+        "samples": len(samples),
+        "passes": [{"name": name, "ms": milliseconds} for name, milliseconds in measured.passes],
+        "left_out": [{"name": name, "reason": reason} for name, reason in measured.left_out],
+        "triangles": measured.triangles,
+        "draws": measured.draws,
+        "instances": measured.instances,
+        "bytes": measured.bytes,
+        "warnings": list(measured.warnings),
+        "engine": "DEEP_GBUFFER",
+        "device": measured.device,
+        "blender": None,
+    }
+
+
+def run(job: dict[str, Any]) -> None:
+    """Do the job. Raises JobError, OSError or the renderer's errors with a message for a person."""
+    scene = snapshot.load(job["file"])
+    if scene.camera is None:
+        raise JobError(f"{job['file']}: the scene has no camera.")
+    settings = settings_of(job)
+    entries: list[dict[str, Any]] = []
+    for _ in range(job["repeat"]):
+        entries.append(render(scene, scene.camera, settings, job["time_limit"] or 0.0))
+        picture = entries[-1].pop("picture")
+    path = Path(job["scratch"]) / "picture.exr"
+    write_channels(path, {letter: picture[..., index] for index, letter in enumerate("RGBA")})
+    send("picture", {"path": str(path), "frame": 0})
+    send("statistics", entries)
+
+
+def main() -> int:
+    """Exit code of the job in `sys.argv`."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    job = json.loads(sys.argv[sys.argv.index("--") + 1])
+    try:
+        run(job)
+    except (JobError, OSError, snapshot.SnapshotError, DeviceError, RenderError, ShaderError) as error:
+        send("error", str(error))
+        return 1
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    finally:
+        stop_gl_thread()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
