@@ -10,23 +10,18 @@ from typing import Any
 import bpy
 from mathutils import Vector
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+import addon
+
 Color = tuple[float, float, float]
 Point = tuple[float, float, float]
 Profile = Sequence[tuple[float, float]]
 
 
-def register_engine() -> None:
-    """Make the Deep G-Buffer engine known to this Blender, from the source tree."""
-    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-    import addon
-
-    addon.register()
-
-
 def new_scene(world: Color, strength: float = 1.0) -> bpy.types.Scene:
     """An empty scene of 640×360 pixels under a world of one colour, rendered by Deep G-Buffer."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    register_engine()
+    addon.register()
     scene = bpy.context.scene
     scene.render.engine = "DEEP_GBUFFER"
     scene.render.resolution_x, scene.render.resolution_y = 640, 360
@@ -39,11 +34,12 @@ def new_scene(world: Color, strength: float = 1.0) -> bpy.types.Scene:
 
 
 def save(script: str) -> None:
-    """Write the scene beside its script, compressed, with nothing in it that no one uses."""
+    """Write the scene beside its script, compressed, with nothing in it that no one uses, and end with the engine."""
     bpy.data.orphans_purge(do_recursive=True)
     path = Path(script).resolve().with_suffix(".blend")
     bpy.context.preferences.filepaths.save_version = 0
     bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True, relative_remap=True)
+    addon.unregister()
     print(f"{path.name}: {path.stat().st_size / 1024:.0f} KiB")
 
 
@@ -190,9 +186,9 @@ def sun(direction: Point, strength: float, color: Color, angle: float) -> bpy.ty
     return _place_light(light, (0.0, 0.0, 10.0), direction)
 
 
-def area_light(name: str, location: Point, direction: Point, size: tuple[float, float], power: float, color: Color) -> (
-    bpy.types.Object
-):
+def area_light(
+    name: str, location: Point, direction: Point, size: tuple[float, float], power: float, color: Color
+) -> bpy.types.Object:
     """A rectangular area light shining along `direction`; size in m, power in W."""
     light = bpy.data.lights.new(name, "AREA")
     light.shape, light.size, light.size_y = "RECTANGLE", size[0], size[1]

@@ -14,13 +14,8 @@ from pathlib import Path
 PROBE_SECONDS = 30
 PROBE = """
 import sys
-try:
-    import ensurepip, venv
-except ImportError:
-    able = 0
-else:
-    able = 1
-print(*sys.version_info[:3], able)
+from importlib.util import find_spec
+print(*sys.version_info[:3], int(all(map(find_spec, ("ensurepip", "venv")))))
 """
 
 
@@ -54,15 +49,21 @@ def probe(path: Path) -> Interpreter | None:
 
 def candidates(major: int, minor: int) -> Iterator[Path]:
     """Every file that may be Python `major.minor`, in the order they are preferred; not yet run."""
-    names = [f"python{major}.{minor}", "python3"] if os.name != "nt" else ["python.exe"]
+    named = "python.exe" if os.name == "nt" else f"python{major}.{minor}"
+    path = [Path(folder) for folder in os.environ.get("PATH", "").split(os.pathsep) if folder and not _is_shims(folder)]
     if sys.version_info[:2] == (major, minor):
         yield Path(sys.executable)
-    for folder in os.environ.get("PATH", "").split(os.pathsep):
-        yield from (Path(folder) / name for name in names if folder)
+    yield from (folder / named for folder in path)
     for folder, pattern in version_folders(major, minor):
         for version in sorted(folder.glob(pattern), reverse=True):
-            yield from (version / "bin" / name for name in names)
+            yield version / "bin" / named
             yield version / "python.exe"
+    yield from (folder / "python3" for folder in path)
+
+
+def _is_shims(folder: str) -> bool:
+    """Whether a folder on PATH holds pyenv's shims: slow to ask, and what they lead to is in pyenv's own folders."""
+    return Path(folder).name == "shims" and ".pyenv" in Path(folder).parent.name
 
 
 def version_folders(major: int, minor: int) -> Iterator[tuple[Path, str]]:

@@ -14,7 +14,7 @@ from tooling import blender_window, environments, places
 from tooling.console import ToolError, say, warn
 
 KINDS = ("unit", "gl", "blender", "gui", "stability")
-BY_DEFAULT = ("unit", "gl", "blender", "gui")
+BY_DEFAULT = KINDS
 NO_TESTS = 5
 BENCHES = places.TESTS / "bench"
 # os._exit: Blender 4.5 may wait for ever at exit once it had a GL context of its own.

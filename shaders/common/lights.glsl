@@ -11,14 +11,47 @@ const int SHAPE_ELLIPSE = 1;
 
 uniform sampler2D light_table;
 
+struct Light
+{
+    int kind;
+    vec3 position;
+    vec3 axis;              // unit, where it shines
+    float radius;           // m; of a sun: half angle, rad
+    vec3 emission;
+    float cone_cosine;      // of a spot's half angle
+    float cone_softness;    // width of its soft edge, in cosines
+    vec3 half_x;
+    vec3 half_y;
+    bool ellipse;
+    float diffuse_factor;
+    float specular_factor;
+    float spread_slope;     // of an area light; of a point or spot light: above 0 where it is a disk
+    float spread_norm;
+};
+
 struct LightSample
 {
     vec3 direction;         // unit, from the surface to the light
     vec3 weight;            // incident radiance over the probability density in solid angle: irradiance per n·l, W/m²
-    float diffuse_factor;
-    float specular_factor;
-    bool extended;          // whether other (u, v) give other samples
 };
+
+Light fetch_light(int index)
+{
+    vec4 row_0 = texelFetch(light_table, ivec2(0, index), 0);
+    vec4 row_1 = texelFetch(light_table, ivec2(1, index), 0);
+    vec4 row_2 = texelFetch(light_table, ivec2(2, index), 0);
+    vec4 row_3 = texelFetch(light_table, ivec2(3, index), 0);
+    vec4 row_4 = texelFetch(light_table, ivec2(4, index), 0);
+    vec4 row_5 = texelFetch(light_table, ivec2(5, index), 0);
+    return Light(int(row_0.w), row_0.xyz, row_1.xyz, row_1.w, row_2.rgb, row_2.w, row_3.w, row_3.xyz, row_4.xyz,
+                 int(row_4.w) == SHAPE_ELLIPSE, row_5.x, row_5.y, row_5.z, row_5.w);
+}
+
+/** Whether other (u, v) give other samples. */
+bool is_extended(Light light)
+{
+    return light.kind == LIGHT_AREA || light.radius > 0.0;
+}
 
 /** Unit square -> unit disk, area preserving (Shirley and Chiu 1997). */
 vec2 sample_disk(vec2 u)
@@ -62,70 +95,64 @@ float cone_flattening(float sine_squared)
     return 2.0 / (1.0 + sqrt(max(1.0 - sine_squared, 0.0)));
 }
 
-/** Sample light `index` from `position` with (u, v) in [0, 1)². An unlit sample has weight 0. */
-LightSample sample_light(int index, vec3 position, vec2 u)
+LightSample sample_sun(Light light, vec2 u)
 {
-    vec4 place = texelFetch(light_table, ivec2(0, index), 0);
-    vec4 axis = texelFetch(light_table, ivec2(1, index), 0);
-    vec4 emission = texelFetch(light_table, ivec2(2, index), 0);
-    vec4 half_x = texelFetch(light_table, ivec2(3, index), 0);
-    vec4 half_y = texelFetch(light_table, ivec2(4, index), 0);
-    vec4 factors = texelFetch(light_table, ivec2(5, index), 0);
-    int kind = int(place.w);
+    float sine = sin(light.radius);
+    return LightSample(sample_cone(-light.axis, sine * sine, u), light.emission * cone_flattening(sine * sine));
+}
 
-    LightSample result;
-    result.diffuse_factor = factors.x;
-    result.specular_factor = factors.y;
-    result.extended = kind == LIGHT_AREA || axis.w > 0.0;
-    result.direction = -axis.xyz;
-    result.weight = vec3(0.0);
+LightSample sample_area(Light light, vec3 position, vec2 u)
+{
+    vec2 p = light.ellipse ? sample_disk(u) : 2.0 * u - 1.0;
+    float area = length(light.half_x) * length(light.half_y) * (light.ellipse ? PI : 4.0);
+    vec3 to_light = light.position + p.x * light.half_x + p.y * light.half_y - position;
+    float distance_squared = dot(to_light, to_light);
+    vec3 direction = to_light * inversesqrt(distance_squared);
+    float cosine = -dot(direction, light.axis);
+    if (!(distance_squared > 0.0 && cosine > 0.0))
+        return LightSample(-light.axis, vec3(0.0));
+    // Spread: radiance falls with the slope from the axis, normalised to the flux of a Lambertian emitter.
+    float spread = 1.0;
+    if (light.spread_norm > 0.0)
+        spread = max(light.spread_slope - sqrt(max(1.0 - cosine * cosine, 0.0)) / cosine, 0.0) / light.spread_norm;
+    return LightSample(direction, light.emission * (spread * area * cosine / distance_squared));
+}
 
-    if (kind == LIGHT_SUN) {
-        float sine = sin(axis.w);
-        result.direction = sample_cone(-axis.xyz, sine * sine, u);
-        result.weight = emission.rgb * cone_flattening(sine * sine);
-        return result;
-    }
-    if (kind == LIGHT_AREA) {
-        bool ellipse = int(half_y.w) == SHAPE_ELLIPSE;
-        vec2 p = ellipse ? sample_disk(u) : 2.0 * u - 1.0;
-        float area = length(half_x.xyz) * length(half_y.xyz) * (ellipse ? PI : 4.0);
-        vec3 to_light = place.xyz + p.x * half_x.xyz + p.y * half_y.xyz - position;
-        float distance_squared = dot(to_light, to_light);
-        if (distance_squared == 0.0)
-            return result;
-        result.direction = to_light * inversesqrt(distance_squared);
-        float cosine = -dot(result.direction, axis.xyz);
-        if (cosine <= 0.0)
-            return result;
-        // Spread: radiance falls with the slope from the axis, normalised to the flux of a Lambertian emitter.
-        float spread = 1.0;
-        if (factors.w > 0.0)
-            spread = max(factors.z - sqrt(max(1.0 - cosine * cosine, 0.0)) / cosine, 0.0) / factors.w;
-        result.weight = emission.rgb * (spread * area * cosine / distance_squared);
-        return result;
-    }
-    vec3 to_light = place.xyz - position;
+/** A disk of the light's radius that faces the surface (Blender's soft falloff): finite however near. */
+LightSample sample_facing_disk(Light light, vec3 to_light, float distance_squared, vec2 u)
+{
+    vec2 p = light.radius * sample_disk(u);
+    float on_disk_squared = distance_squared + dot(p, p);
+    vec3 tangent, bitangent;
+    orthonormal_basis(to_light * inversesqrt(distance_squared), tangent, bitangent);
+    vec3 direction = (to_light + p.x * tangent + p.y * bitangent) * inversesqrt(on_disk_squared);
+    return LightSample(direction, light.emission * (sqrt(distance_squared / on_disk_squared) / on_disk_squared));
+}
+
+LightSample sample_sphere(Light light, vec3 to_light, float distance_squared, vec2 u)
+{
+    float radius_squared = light.radius * light.radius;
+    float sine_squared = min(radius_squared / distance_squared, 1.0);
+    vec3 direction = sample_cone(to_light * inversesqrt(distance_squared), sine_squared, u);
+    return LightSample(direction,
+                       light.emission * (cone_flattening(sine_squared) / max(distance_squared, radius_squared)));
+}
+
+/** Sample a light from `position` with (u, v) in [0, 1)². An unlit sample has weight 0. */
+LightSample sample_light(Light light, vec3 position, vec2 u)
+{
+    if (light.kind == LIGHT_SUN)
+        return sample_sun(light, u);
+    if (light.kind == LIGHT_AREA)
+        return sample_area(light, position, u);
+    vec3 to_light = light.position - position;
     float distance_squared = dot(to_light, to_light);
     if (distance_squared == 0.0)
-        return result;
-    result.direction = to_light * inversesqrt(distance_squared);
-    float cone = 1.0;
-    if (kind == LIGHT_SPOT)
-        cone = smoothstep(0.0, 1.0, (-dot(result.direction, axis.xyz) - emission.w) / half_x.w);
-    if (factors.z > 0.0) {
-        // A disk that faces the surface (Blender's soft falloff): finite however near, and never cut by it.
-        vec2 p = axis.w * sample_disk(u);
-        float on_disk_squared = distance_squared + dot(p, p);
-        vec3 tangent, bitangent;
-        orthonormal_basis(result.direction, tangent, bitangent);
-        result.direction = (to_light + p.x * tangent + p.y * bitangent) * inversesqrt(on_disk_squared);
-        float cosine = sqrt(distance_squared / on_disk_squared);
-        result.weight = emission.rgb * (cone * cosine / on_disk_squared);
-        return result;
-    }
-    float sine_squared = min(axis.w * axis.w / distance_squared, 1.0);
-    result.direction = sample_cone(result.direction, sine_squared, u);
-    result.weight = emission.rgb * (cone * cone_flattening(sine_squared) / max(distance_squared, axis.w * axis.w));
+        return LightSample(-light.axis, vec3(0.0));
+    LightSample result = light.spread_slope > 0.0 ? sample_facing_disk(light, to_light, distance_squared, u)
+                                                  : sample_sphere(light, to_light, distance_squared, u);
+    if (light.kind == LIGHT_SPOT)
+        result.weight *=
+            smoothstep(0.0, 1.0, (-dot(result.direction, light.axis) - light.cone_cosine) / light.cone_softness);
     return result;
 }

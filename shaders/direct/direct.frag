@@ -30,14 +30,16 @@ vec3 lit_radiance(Surface surface, vec3 position, vec3 normal, vec3 view)
     vec2 specular_sample = fract(light_sample + hash_to_unit(uvec2(gl_FragCoord.xy)));
     vec3 radiance = vec3(0.0);
     for (int index = 0; index < light_count; ++index) {
-        LightSample light = sample_light(index, position, light_sample);
-        float cosine = max(dot(normal, light.direction), 0.0);
-        radiance += surface.diffuse_albedo / PI * light.weight * (cosine * light.diffuse_factor);
+        Light light = fetch_light(index);
+        LightSample incident = sample_light(light, position, light_sample);
+        float cosine = max(dot(normal, incident.direction), 0.0);
+        radiance += surface.diffuse_albedo / PI * incident.weight * (cosine * light.diffuse_factor);
         if (!specular)
             continue;
-        if (light.extended)
-            light = sample_light(index, position, specular_sample);
-        radiance += specular_brdf_cosine(surface, normal, view, light.direction) * light.weight * light.specular_factor;
+        if (is_extended(light))
+            incident = sample_light(light, position, specular_sample);
+        radiance += specular_brdf_cosine(surface, normal, view, incident.direction) * incident.weight
+                    * light.specular_factor;
     }
     return radiance;
 }

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs of `build.py render` that are timed from outside, and Markdown tables of what they took."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+RESULTS = Path(__file__).resolve().parent / "results"
+RESOLUTION = "640x360"
+SAMPLES = 16
+
+
+@dataclass(frozen=True)
+class Run:
+    """`seconds`: of the whole process. `statistics`: one object per repeat."""
+
+    seconds: float
+    statistics: list[dict[str, Any]]
+
+
+def render(blend: Path, engine: str, scratch: Path, shader_cache: Path, *, repeat: int = 1) -> Run:
+    """Render a .blend in a process of its own, with Mesa's shader cache in the folder `shader_cache`."""
+    statistics = scratch / "statistics.json"
+    command = [sys.executable, str(REPOSITORY / "build.py"), "render", str(blend), "-o", str(scratch / f"{engine}.png")]
+    command += ["--engine", engine, "--resolution", RESOLUTION, "--samples", str(SAMPLES), "--repeat", str(repeat)]
+    surroundings = {**os.environ, "LIBGL_ALWAYS_SOFTWARE": "1", "MESA_SHADER_CACHE_DIR": str(shader_cache)}
+    start = time.perf_counter()
+    subprocess.run([*command, "--stats", str(statistics)], env=surroundings, check=True)
+    return Run(time.perf_counter() - start, json.loads(statistics.read_text(encoding="utf-8")))
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A Markdown table."""
+    lines = [header, ["---"] * len(header), *rows]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def report(name: str, title: str, text: str) -> None:
+    """Print a result and write it to results/NAME.md."""
+    document = f"# {title}\n\n{text}"
+    RESULTS.mkdir(exist_ok=True)
+    (RESULTS / f"{name}.md").write_text(document, encoding="utf-8")
+    print(document)
