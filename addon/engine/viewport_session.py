@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..render import Device, DeviceError, Renderer, RenderError, ShaderError, gl_thread
+from ..render import Device, DeviceError, GLThread, Renderer, RenderError, ShaderError, gl_thread
 from ..scene import Camera, Channel, RenderSettings, Scene
 from ..scene.arrays import Float32Array
 from . import messages
@@ -69,6 +69,7 @@ class ViewportSession:
         self._revision = 0
         self._queued = False
         self._closed = False
+        self._thread: GLThread
         # Only the GL thread touches these.
         self._renderer: Renderer | None = None
         self._begun: View | None = None
@@ -108,7 +109,7 @@ class ViewportSession:
                 return
             self._view = View(scene, camera, settings)
             self._error = None
-            self._queue()
+            self._queue(gl_thread())
 
     def close(self) -> None:
         """Stop refining and free the GPU data once the job under way is done. Never waits."""
@@ -118,11 +119,12 @@ class ViewportSession:
             if self._renderer is not None or self._queued:
                 gl_thread().submit(self._release)
 
-    def _queue(self) -> None:
-        """Have the next job run, unless it is queued already. Call with the lock held."""
+    def _queue(self, thread: GLThread) -> None:
+        """Have the next job run on `thread`, unless it is queued already. Call with the lock held."""
         if not self._queued and not self._closed:
             self._queued = True
-            gl_thread().submit(self._render).add_done_callback(self._rendered)
+            self._thread = thread
+            thread.submit(self._render).add_done_callback(self._rendered)
 
     def _render(self, device: Device) -> bool:
         """One job: one more sample of the newest view. Returns whether it needs more."""
@@ -156,7 +158,7 @@ class ViewportSession:
                 self._error = _readable(error)
                 self._revision += 1
             elif newer or future.result():
-                self._queue()
+                self._queue(self._thread)  # not `gl_thread()`: one that is being stopped must not be started again
 
     def _release(self, _device: Device) -> None:
         if self._renderer is not None:

@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Scene -> images through a deep G-buffer. Knows OpenGL and the scene contract, nothing of Blender."""
 
-from .device import Device, DeviceError, GLThread, gl_thread, stop_gl_thread
+from .device import Device, DeviceError, GLThread, RenderError, gl_thread, stop_gl_thread
 from .plan import LeftOut, Plan, PlannedPass, plan
 from .programs import ShaderError
 from .readback import LayerImages
 from .renderer import Renderer
 from .statistics import RenderStatistics
-from .targets import RenderError
 
 __all__ = [
     "Device",

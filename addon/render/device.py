@@ -28,19 +28,34 @@ class DeviceError(RuntimeError):
     """There is no usable OpenGL; the message says what is missing and what to install."""
 
 
+class RenderError(RuntimeError):
+    """The picture cannot be rendered with these settings; the message says what is too large and what to change."""
+
+
 class Device:
     """An OpenGL ≥ 4.10 core context and what is shared by every view: its programs, tables and limits."""
 
     def __init__(self) -> None:
         self.context = _create_context()
         self.raw = RawGL(self.context)
-        self.zero_to_one_depth = self.raw.use_zero_to_one_depth()
+        self.zero_to_one_depth = self.raw.set_clip_space(zero_to_one=True)
         self.programs = ProgramLibrary(self.context)
         self.ggx_albedo = self.context.texture((TABLE_SIZE, TABLE_SIZE), 2, ggx_albedo_table(), dtype="f4")
         self.ggx_albedo.repeat_x = self.ggx_albedo.repeat_y = False
         self.name = f"{self.context.info['GL_RENDERER']}, OpenGL {self.context.info['GL_VERSION']}"
         self.maximum_size = min(self.context.info["GL_MAX_TEXTURE_SIZE"], *self.context.info["GL_MAX_VIEWPORT_DIMS"])
+        self.is_software = any(word in self.name.lower() for word in ("llvmpipe", "softpipe", "swrast", "swiftshader"))
+        self.idle_queries: list[moderngl.Query] = []
         self.uniform_alignment: int = self.context.info["GL_UNIFORM_BUFFER_OFFSET_ALIGNMENT"]
+
+    def out_of_memory(self) -> bool:
+        """Whether the driver refused memory since this was last asked."""
+        return self.context.error == "GL_OUT_OF_MEMORY"
+
+    def check_upload(self, item: str, size: int) -> None:
+        """Raise RenderError naming `item` (its kind and name) of `size` bytes where the driver had no memory for it."""
+        if self.out_of_memory():
+            raise RenderError(f"Out of graphics memory for {item} ({size / 2**20:.0f} MiB).")
 
     def release(self) -> None:
         """Free the shared objects and the context."""
@@ -75,22 +90,25 @@ class GLThread:
     def __init__(self) -> None:
         self._jobs: queue.SimpleQueue[tuple[Callable[[Device], Any], Future[Any]] | None] = queue.SimpleQueue()
         self._stopping = False
+        self._lock = threading.Lock()
         self._thread = threading.Thread(target=self._run, name="GLThread", daemon=True)
         self._thread.start()
 
     def submit(self, job: Callable[[Device], T]) -> "Future[T]":
         """Queue a job; its result or exception (DeviceError where there is no OpenGL) is in the future."""
         future: Future[T] = Future()
-        if self._stopping:
-            future.cancel()
-        else:
-            self._jobs.put((job, future))
+        with self._lock:
+            if self._stopping:
+                future.cancel()
+            else:
+                self._jobs.put((job, future))
         return future
 
     def stop(self) -> None:
         """Let the job under way finish, cancel the queued ones, free the context and end the thread."""
-        self._stopping = True
-        self._jobs.put(None)
+        with self._lock:
+            self._stopping = True
+            self._jobs.put(None)
         self._thread.join()
 
     @property

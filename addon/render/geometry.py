@@ -70,16 +70,21 @@ def pack_instances(batch: InstanceBatch) -> bytes:
 
 
 class GeometryStore:
-    """GPU mirror of `Scene.meshes` and `Scene.batches`."""
+    """GPU mirror of `Scene.meshes` and `Scene.batches`.
+
+    `generation` changes whenever vertex arrays that were handed out are no longer valid.
+    """
 
     def __init__(self, device: Device) -> None:
+        self._device = device
         self._context = device.context
         self._meshes: dict[str, MeshBuffers] = {}
         self._batches: dict[str, InstanceBuffer] = {}
+        self.generation = 0
         self._vertex_arrays: dict[tuple[str, str, moderngl.Program], moderngl.VertexArray] = {}
 
     def update(self, scene: Scene) -> None:
-        """Mirror the scene."""
+        """Mirror the scene. Raises RenderError naming the mesh that graphics memory has no room for."""
         replaced = self._drop(
             self._meshes, (key for key, held in self._meshes.items() if _is_stale(held, scene.meshes.get(key)))
         )
@@ -91,9 +96,12 @@ class GeometryStore:
             self._release_vertex_arrays()
         for batch in scene.batches:
             if batch.mesh not in self._meshes:
-                self._meshes[batch.mesh] = MeshBuffers(self._context, scene.meshes[batch.mesh])
+                mesh = scene.meshes[batch.mesh]
+                held = self._meshes[batch.mesh] = MeshBuffers(self._context, mesh)
+                self._device.check_upload(f'mesh "{mesh.name}"', held.bytes)
             if batch.key not in self._batches:
-                self._batches[batch.key] = InstanceBuffer(self._context, batch)
+                placed = self._batches[batch.key] = InstanceBuffer(self._context, batch)
+                self._device.check_upload(f'{batch.count} instances of mesh "{batch.mesh}"', placed.buffer.size)
 
     def vertex_array(self, batch: InstanceBatch, program: moderngl.Program) -> moderngl.VertexArray:
         """The vertex array that draws a batch with a program."""
@@ -120,6 +128,7 @@ class GeometryStore:
         self._drop(self._batches, list(self._batches))
 
     def _release_vertex_arrays(self) -> None:
+        self.generation += 1
         for vertex_array in self._vertex_arrays.values():
             vertex_array.release()
         self._vertex_arrays.clear()

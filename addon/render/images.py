@@ -18,7 +18,10 @@ class ImageStore:
         self._samplers: dict[tuple[Extension, Interpolation], moderngl.Sampler] = {}
 
     def update(self, scene: Scene) -> list[str]:
-        """Mirror the scene's images; returns warnings for those that had to be made smaller."""
+        """Mirror the scene's images; returns warnings for those that had to be made smaller.
+
+        Raises RenderError naming the image that graphics memory has no room for.
+        """
         for key in [key for key, (version, _) in self._textures.items() if _version(scene, key) != version]:
             self._textures.pop(key)[1].release()
         warnings: list[str] = []
@@ -64,6 +67,7 @@ class ImageStore:
             internal_format=SRGB8_ALPHA8 if image.srgb and not is_float else None,
         )
         texture.build_mipmaps()
+        self._device.check_upload(f'image "{image.name}"', pixels.nbytes)
         return texture
 
     def _sampler(self, texture: ImageTexture) -> moderngl.Sampler:

@@ -2,6 +2,7 @@
 """The deep G-buffer's channels: what is stored per pixel and layer, in which format."""
 
 from dataclasses import dataclass
+from math import inf
 
 _BYTES = {"f4": 4, "f2": 2, "f1": 1, "nu2": 2, "u2": 2}
 
@@ -43,9 +44,7 @@ class GBufferChannel:
 
 
 CHANNELS = (
-    GBufferChannel(
-        "view_depth", 1, "f4", "float", "linear depth along the view axis, m; +inf where empty", float("inf")
-    ),
+    GBufferChannel("view_depth", 1, "f4", "float", "linear depth along the view axis, m; +inf where empty", inf),
     GBufferChannel("normal", 2, "nu2", "vec2", "world-space shading normal facing the viewer, octahedral"),
     GBufferChannel("base_color", 4, "f2", "vec4", "scene-linear base colour; alpha holds F0, the specular reflectance"),
     GBufferChannel("material", 2, "f1", "vec2", "metallic, roughness"),
@@ -57,9 +56,13 @@ DEPTH_BYTES = 4
 """The 32-bit float hardware depth buffer, shared by all layers."""
 
 
-def outputs_glsl(channels: tuple[GBufferChannel, ...]) -> str:
-    """GLSL fragment output declarations for the channels that are written, in attachment order."""
+ORACLES = (TargetSpec("gbuffer.oracle_0", 1, "f4", 1, inf), TargetSpec("gbuffer.oracle_1", 1, "f4", 1, inf))
+"""View depth of the layer being drawn, and of the one before, which fragments are tested against; in turns."""
+
+
+def outputs_glsl(channels: tuple[GBufferChannel, ...], *, oracle: bool) -> str:
+    """GLSL fragment output declarations in attachment order: the channels that are written, then the oracle."""
+    outputs = [(channel.glsl_type, channel.name) for channel in channels] + [("float", "oracle")] * oracle
     return "".join(
-        f"layout(location = {index}) out {channel.glsl_type} out_{channel.name};\n"
-        for index, channel in enumerate(channels)
+        f"layout(location = {index}) out {glsl_type} out_{name};\n" for index, (glsl_type, name) in enumerate(outputs)
     )

@@ -7,6 +7,7 @@ from ..scene import AreaShape, Light, LightKind
 from ..scene.arrays import Float32Array, Float64Array
 
 TEXELS_PER_LIGHT = 6
+LIGHTS_PER_ROW = 256
 
 KIND_CODES = {LightKind.POINT: 0, LightKind.SUN: 1, LightKind.SPOT: 2, LightKind.AREA: 3}
 _SHAPE_CODES = {AreaShape.RECTANGLE: 0, AreaShape.ELLIPSE: 1}
@@ -15,15 +16,17 @@ _FULL_SPREAD = np.pi - 1e-4
 
 
 def light_table(lights: tuple[Light, ...], origin: Float64Array) -> Float32Array:
-    """(lights, 6, 4) float32, positions relative to the camera position `origin` (3,); rows as `lights.glsl` reads:
+    """(rows, 256 · 6, 4) float32: 256 lights a row, 6 texels a light, positions relative to the camera `origin` (3,).
 
+    The texels of a light, as `lights.glsl` reads them:
     0 position, kind · 1 emission axis, radius (m; sun: half angle, rad) · 2 emission, cosine of the spot's half angle
     3 half x axis (m), soft width of the spot in cosines · 4 half y axis (m), shape
     5 diffuse factor, specular factor; area: spread slope T = tan h, spread norm T − h (0: emits all around);
       point, spot: whether it is a disk, 0.
     """
-    table = np.zeros((len(lights), TEXELS_PER_LIGHT, 4), np.float32)
-    for row, light in zip(table, lights, strict=True):
+    rows = -(-len(lights) // LIGHTS_PER_ROW)
+    table = np.zeros((rows * LIGHTS_PER_ROW, TEXELS_PER_LIGHT, 4), np.float32)
+    for row, light in zip(table, lights, strict=False):
         rotation = light.world_from_light[:3, :3]
         row[0] = (*(light.world_from_light[:3, 3] - origin), KIND_CODES[light.kind])
         row[1] = (*-rotation[:, 2], 0.5 * light.angle if light.kind is LightKind.SUN else light.radius)
@@ -41,4 +44,4 @@ def light_table(lights: tuple[Light, ...], origin: Float64Array) -> Float32Array
         if light.kind is LightKind.AREA and light.spread < _FULL_SPREAD:
             half = max(0.5 * light.spread, 1e-3)
             row[5, 2:] = (np.tan(half), np.tan(half) - half)
-    return table
+    return table.reshape(rows, LIGHTS_PER_ROW * TEXELS_PER_LIGHT, 4)

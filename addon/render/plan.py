@@ -4,7 +4,7 @@
 from dataclasses import dataclass
 
 from ..scene import BaseColorSource, Channel, DebugView, Material, RenderSettings, Scene
-from .layout import CHANNELS, GBufferChannel, TargetSpec
+from .layout import CHANNELS, ORACLES, GBufferChannel, TargetSpec
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def plan(scene: Scene, settings: RenderSettings) -> Plan:
     channels = _read_channels(scene, settings, direct, left_out)
     gbuffer = PlannedPass(
         "gbuffer",
-        writes=tuple(channel.target(layers) for channel in channels),
+        writes=tuple(channel.target(layers) for channel in channels) + (ORACLES if layers > 1 else ()),
         defines=frozenset({"PEEL"} if layers > 1 else ()),
     )
     passes = (gbuffer, *((direct,) if direct else ()), _plan_composite(settings, direct))

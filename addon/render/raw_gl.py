@@ -21,6 +21,7 @@ _DEPTH_ATTACHMENT = 0x8D00
 _FRAMEBUFFER_COMPLETE = 0x8CD5
 _LOWER_LEFT = 0x8CA1
 _ZERO_TO_ONE = 0x935F
+_NEGATIVE_ONE_TO_ONE = 0x935E
 _TEXTURE_WRAP_S = 0x2802
 _TEXTURE_WRAP_T = 0x2803
 _MIRRORED_REPEAT = 0x8370
@@ -52,11 +53,11 @@ class RawGL:
             else None
         )
 
-    def use_zero_to_one_depth(self) -> bool:
-        """Map clip-space depth to 0…1 as it is, keeping float precision near 0; False where the driver cannot."""
+    def set_clip_space(self, *, zero_to_one: bool) -> bool:
+        """Choose clip-space depth 0…1, which keeps float precision near 0, or OpenGL's −1…1; False where it cannot."""
         if self._clip_control is None:
             return False
-        self._clip_control(_LOWER_LEFT, _ZERO_TO_ONE)
+        self._clip_control(_LOWER_LEFT, _ZERO_TO_ONE if zero_to_one else _NEGATIVE_ONE_TO_ONE)
         return True
 
     def make_float_depth(self, texture: moderngl.Texture) -> None:
@@ -65,16 +66,15 @@ class RawGL:
         self._bind_texture(_TEXTURE_2D, texture.glo)
         self._tex_image_2d(_TEXTURE_2D, 0, _DEPTH_COMPONENT32F, width, height, 0, _DEPTH_COMPONENT, _FLOAT, None)
 
-    def attach_layer(
+    def attach_layers(
         self,
         framebuffer: moderngl.Framebuffer,
-        arrays: list[moderngl.TextureArray],
-        layer: int,
+        layers: list[tuple[moderngl.TextureArray, int]],
         depth: moderngl.Texture | None,
     ) -> bool:
-        """Attach one layer of each texture array, and a 2D depth texture; whether the result is complete."""
+        """Attach a layer of each texture array, and a 2D depth texture; whether the result is complete."""
         self._bind_framebuffer(_FRAMEBUFFER, framebuffer.glo)
-        for index, array in enumerate(arrays):
+        for index, (array, layer) in enumerate(layers):
             self._framebuffer_texture_layer(_FRAMEBUFFER, _COLOR_ATTACHMENT0 + index, array.glo, 0, layer)
         if depth is not None:
             self._framebuffer_texture_2d(_FRAMEBUFFER, _DEPTH_ATTACHMENT, _TEXTURE_2D, depth.glo, 0)

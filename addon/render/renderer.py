@@ -28,7 +28,7 @@ class Renderer:
         self._geometry = GeometryStore(device)
         self._images = ImageStore(device)
         self._film = Film(device)
-        self._timers = PassTimers(device.context)
+        self._timers = PassTimers(device)
         self._passes: dict[str, Pass] = {}
         self._frame: Frame | None = None
         self._camera: Camera | None = None
@@ -42,6 +42,7 @@ class Renderer:
 
         Raises RenderError where the device cannot hold the targets, ShaderError where a shader is broken.
         """
+        self._frame = None
         start = time.perf_counter()
         self._geometry.update(scene)
         self._warnings = tuple(self._images.update(scene))
@@ -125,6 +126,7 @@ class Renderer:
         self._images.release()
         self._geometry.release()
         self._pool.release()
+        self._timers.forget()
         self._frame = None
 
     def _prepare_passes(self, frame: Frame) -> None:

@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a render did and what it cost."""
 
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
 import moderngl
 
+from .device import Device
+
 
 @dataclass(frozen=True)
 class RenderStatistics:
-    """`upload_s` of the last `begin`; GPU milliseconds per pass of the last sample; reasons for what was left out;
+    """`upload_s` of the last `begin`; milliseconds per pass of the last sample; reasons for what was left out;
     triangles (instances counted), draws and instances of one geometry pass; bytes of video memory per target.
     """
 
@@ -26,24 +29,38 @@ class RenderStatistics:
 
 
 class PassTimers:
-    """One GPU timer query per pass."""
+    """Milliseconds per pass: by timer queries, or by the clock where the driver draws on the CPU.
 
-    def __init__(self, context: moderngl.Context) -> None:
-        self._context = context
+    llvmpipe answers queries with the time until its threads were done with everything, the passes before included.
+    """
+
+    def __init__(self, device: Device) -> None:
+        self._device = device
         self._queries: dict[str, moderngl.Query] = {}
+        self._milliseconds: dict[str, float] = {}
 
     @contextmanager
     def measure(self, name: str) -> Iterator[None]:
         """Time what is drawn inside the block under a pass's name."""
+        if self._device.is_software:
+            start = time.perf_counter()
+            yield
+            self._device.context.finish()
+            self._milliseconds[name] = (time.perf_counter() - start) * 1e3
+            return
         if name not in self._queries:
-            self._queries[name] = self._context.query(time=True)
+            idle = self._device.idle_queries
+            self._queries[name] = idle.pop() if idle else self._device.context.query(time=True)
         with self._queries[name]:
             yield
 
     def forget(self) -> None:
-        """Drop the figures of passes that may no longer run."""
+        """Drop the figures of passes that may no longer run. Queries are kept for others: moderngl frees none."""
+        self._device.idle_queries += self._queries.values()
         self._queries.clear()
+        self._milliseconds.clear()
 
     def milliseconds(self) -> tuple[tuple[str, float], ...]:
-        """(pass, ms) in the order the passes first ran; waits for the GPU."""
-        return tuple((name, query.elapsed / 1e6) for name, query in self._queries.items())
+        """(pass, ms) of the last sample, in the order the passes ran; waits for the GPU."""
+        queried = {name: query.elapsed / 1e6 for name, query in self._queries.items()}
+        return tuple((self._milliseconds | queried).items())

@@ -3,12 +3,11 @@
 
 import moderngl
 
-from .device import Device
+from .device import Device, RenderError
 from .layout import DEPTH_BYTES, TargetSpec
 
-
-class RenderError(RuntimeError):
-    """The picture cannot be rendered with these settings; the message says what is too large and what to change."""
+Attachments = tuple[tuple[str, int], ...]
+"""(target name, layer) pairs in the order of a fragment shader's outputs."""
 
 
 class TexturePool:
@@ -20,7 +19,7 @@ class TexturePool:
         self._specs: dict[str, TargetSpec] = {}
         self._textures: dict[str, moderngl.TextureArray] = {}
         self._depth: moderngl.Texture | None = None
-        self._framebuffers: dict[tuple[tuple[str, ...], int, bool], moderngl.Framebuffer] = {}
+        self._framebuffers: dict[tuple[Attachments, bool], moderngl.Framebuffer] = {}
 
     @property
     def size(self) -> tuple[int, int]:
@@ -73,20 +72,21 @@ class TexturePool:
         self._device.context.finish()
         return self._textures[name].read(alignment=1)
 
-    def framebuffer(self, names: tuple[str, ...], layer: int, *, depth: bool = False) -> moderngl.Framebuffer:
-        """A framebuffer that draws into one layer of the named targets, with the shared depth buffer on request."""
-        key = (names, layer, depth)
+    def framebuffer(self, attachments: Attachments, *, depth: bool = False) -> moderngl.Framebuffer:
+        """A framebuffer that draws into one layer of each named target, with the shared depth buffer on request."""
+        key = (attachments, depth)
         if key not in self._framebuffers:
-            arrays = [self._textures[name] for name in names]
-            framebuffer = self._device.context.framebuffer(arrays)
-            if not self._device.raw.attach_layer(framebuffer, arrays, layer, self._depth if depth else None):
-                raise RenderError(f"The graphics driver cannot draw into the formats of {', '.join(names)}.")
+            layers = [(self._textures[name], layer) for name, layer in attachments]
+            framebuffer = self._device.context.framebuffer([array for array, _ in layers])
+            if not self._device.raw.attach_layers(framebuffer, layers, self._depth if depth else None):
+                names = ", ".join(name for name, _ in attachments)
+                raise RenderError(f"The graphics driver cannot draw into the formats of {names}.")
             self._framebuffers[key] = framebuffer
         return self._framebuffers[key]
 
-    def clear(self, names: tuple[str, ...]) -> None:
-        """Set the bound framebuffer's attachments, which are these targets, to their clear values."""
-        for attachment, name in enumerate(names):
+    def clear(self, attachments: Attachments) -> None:
+        """Set the bound framebuffer's attachments, which are these, to their targets' clear values."""
+        for attachment, (name, _) in enumerate(attachments):
             spec = self._specs[name]
             if spec.dtype.startswith("u"):
                 self._device.raw.clear_color_uint(attachment, int(spec.clear))
@@ -129,7 +129,7 @@ class TexturePool:
         return texture
 
     def _check_memory(self, name: str, bytes_per_pixel: int) -> None:
-        if self._device.context.error == "GL_OUT_OF_MEMORY":
+        if self._device.out_of_memory():
             raise self._too_large(name, bytes_per_pixel)
 
     def _too_large(self, name: str, bytes_per_pixel: int) -> RenderError:

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-import gc
+import ctypes
 import threading
 from concurrent.futures import CancelledError
+from dataclasses import replace
 
 import moderngl
+import numpy as np
 import pytest
 
 from addon.render import DeviceError, GLThread, Renderer, RenderError, ShaderError, device, gl_thread, programs
-from addon.scene import RenderSettings
+from addon.scene import Channel, RenderSettings
 from blender_tests import builders
 
 SCENE = builders.scene(builders.quad("q"), lights=(builders.light(),))
@@ -131,27 +133,92 @@ def test_one_thread_serves_all_and_starts_again_after_a_stop():
     assert second.submit(lambda opened: opened.name).result()
 
 
-GPU_OBJECTS = (moderngl.Buffer, moderngl.Texture, moderngl.TextureArray, moderngl.Framebuffer, moderngl.VertexArray)
-
-
-def live_gpu_objects():
-    gc.collect()
-    return sum(
-        isinstance(item, GPU_OBJECTS) and not isinstance(item.mglo, moderngl.InvalidObject) for item in gc.get_objects()
-    )
+def live_gpu_objects(context):
+    """How many names are textures, buffers, framebuffers, vertex arrays, samplers or queries to OpenGL itself."""
+    load = context.mglo._context.load
+    kinds = ("Texture", "Buffer", "Framebuffer", "VertexArray", "Sampler", "Query", "Program")
+    asks = [ctypes.CFUNCTYPE(ctypes.c_ubyte, ctypes.c_uint)(load(f"glIs{kind}")) for kind in kinds]
+    return sum(ask(name) for ask in asks for name in range(1, 5000))
 
 
 def test_releasing_a_renderer_frees_its_gpu_objects():
     def job(opened):
         counts = []
-        for _ in range(2):
+        for _ in range(3):
             renderer = Renderer(opened)
-            renderer.begin(SCENE, builders.camera(), RenderSettings(16, 16, layers=3, deep_output=True))
-            renderer.render_sample()
-            held = live_gpu_objects()
+            for z in (2.0, 3.0):
+                renderer.begin(SCENE, builders.camera(z=z), RenderSettings(16, 16, layers=3, deep_output=True))
+                renderer.render_sample()
+            held = live_gpu_objects(opened.context)
             renderer.release()
-            counts.append((held, live_gpu_objects()))
+            counts.append((held, live_gpu_objects(opened.context)))
         return counts
 
-    (held, first), (_, second) = gl_thread().submit(job).result()
-    assert held > first == second
+    (held, first), *_, (_, last) = gl_thread().submit(job).result()
+    assert held > first == last
+
+
+def depth_of(renderer, scene, camera, settings):
+    renderer.begin(scene, camera, settings)
+    renderer.render_sample()
+    return renderer.read(Channel.DEPTH)
+
+
+def test_a_refused_begin_leaves_a_renderer_that_works(monkeypatch):
+    """After too large a picture, and after a shader that did not compile, the next one is drawn."""
+    settings = RenderSettings(16, 16, channels=frozenset({Channel.DEPTH}))
+    other = builders.scene(replace(builders.quad("q", z=1.0), version=2), lights=(builders.light(),))
+
+    def job(opened):
+        renderer = Renderer(opened)
+        with pytest.raises(RenderError):
+            renderer.begin(SCENE, builders.camera(), RenderSettings(opened.maximum_size + 1, 16))
+        with pytest.raises(RuntimeError, match="begin"):
+            renderer.render_sample()
+        depths = [depth_of(renderer, SCENE, builders.camera(), settings)[8, 8, 0]]
+        with pytest.raises(RenderError):
+            renderer.begin(other, builders.camera(), RenderSettings(opened.maximum_size + 1, 16))
+        depths.append(depth_of(renderer, SCENE, builders.camera(), settings)[8, 8, 0])
+        with monkeypatch.context() as broken:
+            broken.setattr(opened.programs, "get", fail)
+            with pytest.raises(ShaderError):
+                renderer.begin(other, builders.camera(), settings)
+        depths.append(depth_of(renderer, other, builders.camera(), settings)[8, 8, 0])
+        renderer.release()
+        return depths
+
+    def fail(_spec):
+        raise ShaderError("broken")
+
+    assert gl_thread().submit(job).result() == pytest.approx([3.0, 3.0, 2.0])
+
+
+@pytest.mark.parametrize("orthographic", [False, True])
+def test_without_a_zero_to_one_clip_space_depth_is_as_precise(orthographic):
+    """Planes half a metre apart at 3 km: where the driver lacks clip control, the fragment writes its depth."""
+    half = 4000.0
+    scene = builders.scene(
+        builders.quad("near", z=0.5, half=half),
+        builders.quad("far", half=half),
+        builders.quad("mid", z=0.25, half=half),
+    )
+    camera = builders.camera(z=3000.0, clip_end=1e4, orthographic=orthographic)
+    settings = RenderSettings(32, 32, layers=3, minimum_separation=0.0, deep_output=True)
+
+    def job(opened):
+        images = []
+        for clip_control in (True, False):
+            opened.zero_to_one_depth = clip_control
+            opened.raw.set_clip_space(zero_to_one=clip_control)
+            renderer = Renderer(opened)
+            renderer.begin(scene, camera, settings)
+            renderer.render_sample()
+            images.append([renderer.read_layer(k).depth for k in range(3)])
+            renderer.release()
+        opened.zero_to_one_depth = True
+        opened.raw.set_clip_space(zero_to_one=True)
+        return images
+
+    with_control, without = gl_thread().submit(job).result()
+    np.testing.assert_allclose([image[16, 16] for image in with_control], (2999.5, 2999.75, 3000.0), rtol=1e-7)
+    np.testing.assert_array_equal(with_control, without)

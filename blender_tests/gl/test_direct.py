@@ -15,7 +15,7 @@ EXACT = 2e-5
 
 
 def plane_radiance(render, lights=(), samples=1, world=(0, 0, 0), camera=None, **material):
-    """Radiance of the pixel at (1/64, 1/64) of a plane at z = 0, seen from above."""
+    """Radiance of the pixel at (1/32, 1/32) of a plane at z = 0, seen from above."""
     scene = builders.scene(
         builders.quad("floor", half=50.0), materials=(builders.material(**material),), lights=lights, world=world
     )
@@ -176,6 +176,18 @@ def test_emission_adds_to_reflected_light(render):
     lit = plane_radiance(render, (light,))
     glowing = plane_radiance(render, (light,), emission=(2.0, 0.0, 100000.0))
     np.testing.assert_allclose(glowing - lit, (2.0, 0.0, 100000.0), rtol=1e-5, atol=1e-6)
+
+
+def test_emission_beyond_float32_stays_finite_and_bright(render):
+    radiance = plane_radiance(render, emission=(1e39, 0.0, 1e39), samples=4)
+    assert np.isfinite(radiance).all()
+    assert radiance[0] > 1e20
+
+
+def test_more_lights_than_a_row_of_the_table_add_up(render):
+    light = builders.light(position=(1 / 32, 1 / 32, 2.0), emission=(1e-3, 1e-3, 1e-3))
+    one, many = (plane_radiance(render, (light,) * count, specular=0.04) for count in (1, 600))
+    np.testing.assert_allclose(many, 600 * one, rtol=1e-4)
 
 
 def test_every_layer_is_lit(render):

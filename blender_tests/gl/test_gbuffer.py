@@ -84,31 +84,32 @@ def test_textures_are_read_in_their_colour_space_bottom_row_first(render, image,
     np.testing.assert_allclose(albedo[24, 24], 4.0 if image.pixels.dtype == np.float32 else 1.0)
 
 
+BLACK, GREY, WHITE = 0.0, 188 / 255, 1.0
+
+
 @pytest.mark.parametrize(
-    ("extension", "left", "bottom"),
+    ("extension", "left", "below"),
     [
-        (Extension.REPEAT, "grey", "white"),
-        (Extension.MIRROR, "black", "black"),
-        (Extension.EXTEND, "black", "black"),
-        (Extension.CLIP, "black", "black"),
+        # Texels of the bottom row left of the image, from far to near; of the right column below it, likewise.
+        (Extension.REPEAT, (BLACK, GREY), (GREY, WHITE)),
+        (Extension.MIRROR, (GREY, BLACK), (WHITE, GREY)),
+        (Extension.EXTEND, (BLACK, BLACK), (GREY, GREY)),
+        (Extension.CLIP, None, None),
     ],
 )
-def test_extension_outside_the_image(render, extension, left, bottom):
-    """UVs run from −1 to 2 over the picture: the image is its middle third."""
+def test_extension_outside_the_image(render, extension, left, below):
+    """UVs run from −1 to 2 over the picture: the image is its middle third, a texel is 5 pixels wide."""
     quad = builders.quad("q", half=3.0, uvs=[(-1, -1), (2, -1), (2, 2), (-1, 2)])
     scene = builders.scene(
         quad, materials=(textured(extension=extension, texture_alpha=True),), images=(checker(srgb=False),)
     )
     layer = render(scene, builders.camera(), width=30, height=30, deep_output=True).layers[0]
-    shades = {"black": 0.0, "grey": 188 / 255, "white": 1.0}
+    assert layer.albedo[17, 17, 0] == pytest.approx(WHITE)
     if extension is Extension.CLIP:
-        assert np.isinf(layer.depth[12, 3])  # transparent outside
-    else:
-        assert layer.albedo[12, 7, 0] == pytest.approx(shades[left], abs=1e-3)
-        assert layer.albedo[12, 3, 0] == pytest.approx(
-            {"REPEAT": 0.0, "MIRROR": 188 / 255, "EXTEND": 0.0}[extension], abs=1e-3
-        )
-    assert layer.albedo[17, 17, 0] == pytest.approx(1.0)
+        assert np.isinf(layer.depth[[12, 12, 2, 7], [2, 7, 17, 17]]).all()  # transparent outside
+        return
+    np.testing.assert_allclose(layer.albedo[12, [2, 7], 0], left, atol=1e-3)
+    np.testing.assert_allclose(layer.albedo[[2, 7], 17, 0], below, atol=1e-3)
 
 
 def test_transparent_texels_leave_what_is_behind_in_every_layer(render):

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 
-/** The value, or zero where any component is infinite or not a number: nothing else may reach a target that is read again. */
-vec3 finite_or_zero(vec3 value)
+// Far above any light, and sums of a billion samples of it are still finite.
+const float LARGEST_RADIANCE = 1e29;
+
+/** Radiance without what must never reach a target that is read again: NaN becomes 0, infinity a very large value. */
+vec3 finite_radiance(vec3 radiance)
 {
-    return any(isnan(value)) || any(isinf(value)) ? vec3(0.0) : value;
+    return any(isnan(radiance)) ? vec3(0.0) : min(radiance, vec3(LARGEST_RADIANCE));
 }

@@ -37,12 +37,13 @@ struct LightSample
 
 Light fetch_light(int index)
 {
-    vec4 row_0 = texelFetch(light_table, ivec2(0, index), 0);
-    vec4 row_1 = texelFetch(light_table, ivec2(1, index), 0);
-    vec4 row_2 = texelFetch(light_table, ivec2(2, index), 0);
-    vec4 row_3 = texelFetch(light_table, ivec2(3, index), 0);
-    vec4 row_4 = texelFetch(light_table, ivec2(4, index), 0);
-    vec4 row_5 = texelFetch(light_table, ivec2(5, index), 0);
+    ivec2 first = ivec2(index % LIGHTS_PER_ROW * TEXELS_PER_LIGHT, index / LIGHTS_PER_ROW);
+    vec4 row_0 = texelFetch(light_table, first + ivec2(0, 0), 0);
+    vec4 row_1 = texelFetch(light_table, first + ivec2(1, 0), 0);
+    vec4 row_2 = texelFetch(light_table, first + ivec2(2, 0), 0);
+    vec4 row_3 = texelFetch(light_table, first + ivec2(3, 0), 0);
+    vec4 row_4 = texelFetch(light_table, first + ivec2(4, 0), 0);
+    vec4 row_5 = texelFetch(light_table, first + ivec2(5, 0), 0);
     return Light(int(row_0.w), row_0.xyz, row_1.xyz, row_1.w, row_2.rgb, row_2.w, row_3.w, row_3.xyz, row_4.xyz,
                  int(row_4.w) == SHAPE_ELLIPSE, row_5.x, row_5.y, row_5.z, row_5.w);
 }

@@ -71,5 +71,5 @@ void main()
 #ifdef WORLD
     radiance += world_radiance.rgb * (surface.diffuse_albedo + surface.specular_albedo);
 #endif
-    out_radiance = vec4(finite_or_zero(radiance), 1.0);
+    out_radiance = vec4(finite_radiance(radiance), 1.0);
 }

@@ -3,6 +3,7 @@
 // (Mara et al. 2016, "Deep G-Buffers for Stable Global Illumination Approximation", two-pass generation).
 
 #include "common/constants.glsl"
+#include "common/finite.glsl"
 #include "common/octahedral.glsl"
 #include "generated/GBufferUniforms.glsl"
 #include "generated/MaterialUniforms.glsl"
@@ -12,7 +13,7 @@
 uniform sampler2D base_color_texture;
 #endif
 #ifdef PEEL
-uniform sampler2DArray view_depth_layers;
+uniform sampler2DArray oracle; // view depth of the layer before
 #endif
 
 in float v_view_depth;
@@ -35,7 +36,7 @@ flat in uint v_object_index;
 /** Whether the fragment lies within the minimum separation behind the previous layer. */
 bool too_near_previous_layer()
 {
-    float previous = texelFetch(view_depth_layers, ivec3(gl_FragCoord.xy, layer - 1), 0).r;
+    float previous = texelFetch(oracle, ivec3(gl_FragCoord.xy, 0), 0).r;
     // The last term keeps a surface from peeling itself where variants round differently.
     return !(v_view_depth > previous + minimum_separation + 4.0 * FLOAT_EPSILON * previous);
 }
@@ -56,6 +57,14 @@ vec3 facing_normal()
 }
 #endif
 
+#ifdef FRAGMENT_DEPTH
+/** Depth 1 at the near plane, falling to 0: what a 0…1 clip space stores without this (`Camera.projection`). */
+float reversed_depth()
+{
+    return orthographic != 0 ? (clip_end - v_view_depth) / (clip_end - clip_start) : clip_start / v_view_depth;
+}
+#endif
+
 void main()
 {
 #ifdef WRITE_NORMAL
@@ -73,7 +82,13 @@ void main()
     if (layer > 0 && too_near_previous_layer())
         discard;
 #endif
+#ifdef FRAGMENT_DEPTH
+    gl_FragDepth = reversed_depth();
+#endif
     out_view_depth = v_view_depth;
+#ifdef PEEL
+    out_oracle = v_view_depth;
+#endif
 #ifdef WRITE_NORMAL
     out_normal = encode_octahedral(normal);
 #endif
@@ -91,7 +106,7 @@ void main()
     out_material = material_surface.xy;
 #endif
 #ifdef WRITE_EMISSION
-    out_emission = vec4(material_emission.rgb, 1.0);
+    out_emission = vec4(finite_radiance(material_emission.rgb), 1.0);
 #endif
 #ifdef WRITE_OBJECT_INDEX
     out_object_index = v_object_index;

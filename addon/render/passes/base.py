@@ -5,9 +5,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
-import moderngl
-import numpy as np
-
 from ...scene import Camera, RenderSettings, Scene
 from ..device import Device
 from ..film import Film
@@ -18,28 +15,6 @@ from ..programs import ProgramSpec
 from ..sampling import Sample
 from ..targets import TexturePool
 from ..uniforms import UniformBlock
-
-FULLSCREEN = "common/fullscreen.vert"
-
-CAMERA_UNIFORMS = UniformBlock(
-    "CameraUniforms",
-    (
-        ("world_from_camera", "mat4"),
-        ("camera_window", "vec4"),
-        ("camera_resolution", "vec2"),
-        ("camera_orthographic", "int"),
-    ),
-)
-
-GBUFFER_SAMPLERS = {
-    "view_depth": "view_depth_layers",
-    "normal": "normal_layers",
-    "base_color": "base_color_layers",
-    "material": "material_layers",
-    "emission": "emission_layers",
-    "object_index": "object_index_layers",
-}
-"""G-buffer channel -> the sampler that shaders read it through."""
 
 
 @dataclass
@@ -98,47 +73,6 @@ class UniformBuffer:
     def release(self) -> None:
         """Free the buffer."""
         self._buffer.release()
-
-
-class FullscreenDraw:
-    """Draws one triangle over the viewport with a program; attribute-less vertex arrays are kept per program."""
-
-    def __init__(self, device: Device) -> None:
-        self._device = device
-        self._vertex_arrays: dict[ProgramSpec, moderngl.VertexArray] = {}
-
-    def draw(self, spec: ProgramSpec) -> None:
-        """Draw with the program of a variant into the bound framebuffer."""
-        if spec not in self._vertex_arrays:
-            program = self._device.programs.get(spec)
-            self._vertex_arrays[spec] = self._device.context.vertex_array(program, [])
-        self._vertex_arrays[spec].render(moderngl.TRIANGLES, vertices=3)
-
-    def release(self) -> None:
-        """Free the vertex arrays."""
-        for vertex_array in self._vertex_arrays.values():
-            vertex_array.release()
-        self._vertex_arrays.clear()
-
-
-def bind_camera(buffer: UniformBuffer, binding: int, frame: Frame) -> None:
-    """Bind the camera block that `common/camera.glsl` reads."""
-    rotation = np.eye(4)
-    rotation[:3, :3] = frame.camera.rotation
-    buffer.bind(
-        binding,
-        world_from_camera=rotation,
-        camera_window=frame.camera.window,
-        camera_resolution=frame.pool.size,
-        camera_orthographic=int(frame.camera.orthographic),
-    )
-
-
-def bind_targets(frame: Frame, spec: ProgramSpec, planned: PlannedPass) -> None:
-    """Bind the targets that a pass reads to the units of its samplers."""
-    for name in planned.reads:
-        sampler = GBUFFER_SAMPLERS[name.removeprefix("gbuffer.")] if name.startswith("gbuffer.") else "radiance_layers"
-        frame.pool.texture(name).use(spec.samplers.index(sampler))
 
 
 def subsets(names: Iterable[str]) -> list[frozenset[str]]:

@@ -8,21 +8,10 @@ from ..device import Device
 from ..plan import SUM_CHANNELS, PlannedPass
 from ..programs import ProgramSpec
 from ..uniforms import UniformBlock
-from .base import (
-    CAMERA_UNIFORMS,
-    FULLSCREEN,
-    GBUFFER_SAMPLERS,
-    Frame,
-    FullscreenDraw,
-    UniformBuffer,
-    bind_camera,
-    bind_targets,
-    subsets,
-)
+from .base import Frame, subsets
+from .fullscreen import FullscreenDraw, fullscreen_program
 
 COMPOSITE_UNIFORMS = UniformBlock("CompositeUniforms", (("background", "vec4"), ("shown_layer", "int")))
-
-_CAMERA_BINDING, _COMPOSITE_BINDING = 0, 1
 
 
 class CompositePass:
@@ -31,10 +20,7 @@ class CompositePass:
     name = "composite"
 
     def __init__(self, device: Device) -> None:
-        self._device = device
-        self._camera = UniformBuffer(device, CAMERA_UNIFORMS)
-        self._uniforms = UniformBuffer(device, COMPOSITE_UNIFORMS)
-        self._fullscreen = FullscreenDraw(device)
+        self._fullscreen = FullscreenDraw(device, COMPOSITE_UNIFORMS)
 
     @classmethod
     def variants(cls) -> Iterator[ProgramSpec]:
@@ -50,23 +36,18 @@ class CompositePass:
     def run(self, frame: Frame, planned: PlannedPass) -> None:
         """Add one sample to the film."""
         spec = _program(planned.defines)
-        frame.film.begin_sample(frame.pool.framebuffer(tuple(target.name for target in planned.writes), 0))
-        bind_targets(frame, spec, planned)
-        self._device.ggx_albedo.use(spec.samplers.index("ggx_albedo_table"))
-        bind_camera(self._camera, _CAMERA_BINDING, frame)
+        frame.film.begin_sample(frame.pool.framebuffer(tuple((target.name, 0) for target in planned.writes)))
+        self._fullscreen.bind(frame, spec, planned)
         debug = frame.settings.debug_view is not DebugView.NONE
         visible = not debug and not frame.settings.transparent_film
-        self._uniforms.bind(
-            _COMPOSITE_BINDING,
+        self._fullscreen.draw(
+            spec,
             background=(*frame.scene.world.radiance, 1.0) if visible else (0.0, 0.0, 0.0, 0.0),
             shown_layer=min(frame.settings.debug_layer, frame.plan.layers - 1) if debug else 0,
         )
-        self._fullscreen.draw(spec)
 
     def release(self) -> None:
         """Free the pass's buffers."""
-        self._camera.release()
-        self._uniforms.release()
         self._fullscreen.release()
 
 
@@ -75,11 +56,6 @@ def _program(defines: frozenset[str]) -> ProgramSpec:
     outputs = "".join(
         f"layout(location = {index}) out vec4 out_{channel.value.lower()};\n" for index, channel in enumerate(sums)
     )
-    return ProgramSpec(
-        vertex=FULLSCREEN,
-        fragment="composite/composite.frag",
-        defines=defines,
-        blocks=(CAMERA_UNIFORMS, COMPOSITE_UNIFORMS),
-        samplers=(*GBUFFER_SAMPLERS.values(), "radiance_layers", "ggx_albedo_table"),
-        generated=(("outputs", outputs),),
+    return fullscreen_program(
+        "composite/composite.frag", COMPOSITE_UNIFORMS, defines, generated=(("outputs", outputs),)
     )

@@ -6,28 +6,17 @@ from collections.abc import Iterator
 import moderngl
 
 from ..device import Device
-from ..light_table import TEXELS_PER_LIGHT, light_table
+from ..light_table import LIGHTS_PER_ROW, TEXELS_PER_LIGHT, light_table
 from ..plan import PlannedPass
 from ..programs import ProgramSpec
 from ..uniforms import UniformBlock
-from .base import (
-    CAMERA_UNIFORMS,
-    FULLSCREEN,
-    GBUFFER_SAMPLERS,
-    Frame,
-    FullscreenDraw,
-    UniformBuffer,
-    bind_camera,
-    bind_targets,
-    subsets,
-)
+from .base import Frame, subsets
+from .fullscreen import FullscreenDraw, fullscreen_program
 
 DIRECT_UNIFORMS = UniformBlock(
     "DirectUniforms",
     (("world_radiance", "vec4"), ("light_sample", "vec2"), ("light_count", "int"), ("layer", "int")),
 )
-
-_CAMERA_BINDING, _DIRECT_BINDING = 0, 1
 
 
 class DirectPass:
@@ -37,9 +26,7 @@ class DirectPass:
 
     def __init__(self, device: Device) -> None:
         self._device = device
-        self._camera = UniformBuffer(device, CAMERA_UNIFORMS)
-        self._uniforms = UniformBuffer(device, DIRECT_UNIFORMS)
-        self._fullscreen = FullscreenDraw(device)
+        self._fullscreen = FullscreenDraw(device, DIRECT_UNIFORMS)
         self._lights: moderngl.Texture | None = None
 
     @classmethod
@@ -56,43 +43,33 @@ class DirectPass:
             self._lights = None
         if "LIGHTS" in planned.defines:
             table = light_table(frame.scene.lights, frame.camera.position)
-            self._lights = self._device.context.texture((TEXELS_PER_LIGHT, len(table)), 4, table, dtype="f4")
+            self._lights = self._device.context.texture((table.shape[1], table.shape[0]), 4, table, dtype="f4")
             self._lights.filter = (moderngl.NEAREST, moderngl.NEAREST)
 
     def run(self, frame: Frame, planned: PlannedPass) -> None:
         """Shade all layers."""
         spec = _program(planned.defines)
         self._device.context.enable_only(moderngl.NOTHING)
-        bind_targets(frame, spec, planned)
-        self._device.ggx_albedo.use(spec.samplers.index("ggx_albedo_table"))
+        self._fullscreen.bind(frame, spec, planned)
         if self._lights is not None:
             self._lights.use(spec.samplers.index("light_table"))
-        bind_camera(self._camera, _CAMERA_BINDING, frame)
         for layer in range(frame.plan.layers):
-            frame.pool.framebuffer(tuple(target.name for target in planned.writes), layer).use()
-            self._uniforms.bind(
-                _DIRECT_BINDING,
+            frame.pool.framebuffer(tuple((target.name, layer) for target in planned.writes)).use()
+            self._fullscreen.draw(
+                spec,
                 world_radiance=(*frame.scene.world.radiance, 0.0),
                 light_sample=frame.sample.light,
                 light_count=len(frame.scene.lights),
                 layer=layer,
             )
-            self._fullscreen.draw(spec)
 
     def release(self) -> None:
         """Free the pass's buffers and textures."""
-        self._camera.release()
-        self._uniforms.release()
         self._fullscreen.release()
         if self._lights is not None:
             self._lights.release()
 
 
 def _program(defines: frozenset[str]) -> ProgramSpec:
-    return ProgramSpec(
-        vertex=FULLSCREEN,
-        fragment="direct/direct.frag",
-        defines=defines,
-        blocks=(CAMERA_UNIFORMS, DIRECT_UNIFORMS),
-        samplers=(*GBUFFER_SAMPLERS.values(), "light_table", "ggx_albedo_table"),
-    )
+    table_shape = {f"LIGHTS_PER_ROW {LIGHTS_PER_ROW}", f"TEXELS_PER_LIGHT {TEXELS_PER_LIGHT}"}
+    return fullscreen_program("direct/direct.frag", DIRECT_UNIFORMS, defines | table_shape, samplers=("light_table",))

@@ -11,7 +11,7 @@ import numpy as np
 from ...scene import BaseColorSource, ImageTexture, InstanceBatch, Material, Scene
 from ..device import Device
 from ..geometry import split_float64
-from ..layout import CHANNELS, GBufferChannel, outputs_glsl
+from ..layout import CHANNELS, ORACLES, GBufferChannel, outputs_glsl
 from ..plan import PlannedPass, is_alpha_tested, is_invisible
 from ..programs import ProgramSpec
 from ..raw_gl import CLIP_DISTANCE0
@@ -25,11 +25,13 @@ GBUFFER_UNIFORMS = UniformBlock(
         ("forward", "vec4"),
         ("camera_high", "vec4"),  # the camera's position as two float32 parts
         ("camera_low", "vec4"),
+        ("clip_start", "float"),
         ("clip_end", "float"),
         ("minimum_separation", "float"),
         ("alpha_threshold", "float"),
         ("texture_lod_bias", "float"),
         ("layer", "int"),
+        ("orthographic", "int"),
     ),
 )
 
@@ -42,8 +44,11 @@ MATERIAL_UNIFORMS = UniformBlock(
     ),
 )
 
-_SAMPLERS = ("base_color_texture", "view_depth_layers")
-_TEXTURE_UNIT, _DEPTH_UNIT = 0, 1
+FRAGMENT_DEPTH = "FRAGMENT_DEPTH"
+"""Define where the driver has no 0…1 clip space (macOS): its own depth would round far surfaces together."""
+
+_SAMPLERS = ("base_color_texture", "oracle")
+_TEXTURE_UNIT, _ORACLE_UNIT = 0, 1
 _FRAME_BINDING, _MATERIAL_BINDING = 0, 1
 
 
@@ -69,18 +74,18 @@ class GBufferPass:
         self._uniforms = UniformBuffer(device, GBUFFER_UNIFORMS)
         self._materials: moderngl.Buffer | None = None
         self._draws: list[Draw] = []
-        self._drawn: tuple[Scene, PlannedPass, float] | None = None
+        self._drawn: tuple[Scene, PlannedPass, float, int] | None = None
 
     @classmethod
     def variants(cls) -> Iterator[ProgramSpec]:
-        """Every surface kind with every set of channels besides view depth, peeling or not."""
+        """Every surface kind with every set of channels besides view depth, peeling or not, with either depth."""
         optional = [channel.name for channel in CHANNELS if channel.name != "view_depth"]
-        surfaces = (frozenset[str](), {"TEXTURE"}, {"TEXTURE", "ALPHA_TEST"}, {"ATTRIBUTE"})
+        surfaces = [frozenset(names) for names in ((), ("TEXTURE",), ("TEXTURE", "ALPHA_TEST"), ("ATTRIBUTE",))]
         for names in subsets(optional):
             channels = tuple(channel for channel in CHANNELS if channel.name in names | {"view_depth"})
             for surface in surfaces:
-                for peel in (frozenset[str](), {"PEEL"}):
-                    yield _program(channels, frozenset(surface | peel))
+                for extra in subsets(("PEEL", FRAGMENT_DEPTH)):
+                    yield _program(channels, surface | extra)
 
     @property
     def draws(self) -> int:
@@ -97,19 +102,19 @@ class GBufferPass:
 
         A camera move brings the same scene object again, and nothing is to do.
         """
-        drawn = (frame.scene, planned, frame.settings.alpha_threshold)
+        drawn = (frame.scene, planned, frame.settings.alpha_threshold, frame.geometry.generation)
         if self._drawn is not None and self._drawn[0] is drawn[0] and self._drawn[1:] == drawn[1:]:
             return
-        self._drawn = drawn
+        self._drawn, self._draws = None, []
         offsets = self._upload_materials(frame.scene)
-        self._draws = []
+        depth = frozenset[str](() if self._device.zero_to_one_depth else {FRAGMENT_DEPTH})
         for batch in sorted(frame.scene.batches, key=lambda batch: batch.key):
             mesh = frame.scene.meshes[batch.mesh]
             for slot in mesh.slots:
                 material = frame.scene.materials[batch.materials[min(slot.slot, len(batch.materials) - 1)]]
                 if slot.count == 0 or is_invisible(material, frame.settings):
                     continue
-                spec = _program(frame.plan.channels, _surface_defines(material) | planned.defines)
+                spec = _program(frame.plan.channels, _surface_defines(material) | planned.defines | depth)
                 program = self._device.programs.get(spec)
                 self._draws.append(
                     Draw(
@@ -121,21 +126,24 @@ class GBufferPass:
                         material.texture if "TEXTURE" in spec.defines else None,
                     )
                 )
+        self._drawn = drawn
 
     def run(self, frame: Frame, planned: PlannedPass) -> None:
         """Draw all layers, nearest first."""
         context = self._device.context
-        names = tuple(target.name for target in planned.writes)
         for layer in range(frame.plan.layers):
-            framebuffer = frame.pool.framebuffer(names, layer, depth=True)
+            attachments = [(channel.target(1).name, layer) for channel in frame.plan.channels]
+            if "PEEL" in planned.defines:
+                # The oracle is a texture of its own: OpenGL 4.1 forbids reading any layer of an attached array.
+                attachments.append((ORACLES[layer % 2].name, 0))
+                frame.pool.texture(ORACLES[(layer + 1) % 2].name).use(_ORACLE_UNIT)
+            framebuffer = frame.pool.framebuffer(tuple(attachments), depth=True)
             framebuffer.use()
             framebuffer.clear(depth=0.0)
-            frame.pool.clear(names)
+            frame.pool.clear(tuple(attachments))
             context.enable_only(moderngl.DEPTH_TEST)
             context.enable_direct(CLIP_DISTANCE0)
             context.depth_func = ">"
-            if "PEEL" in planned.defines:
-                frame.pool.texture("gbuffer.view_depth").use(_DEPTH_UNIT)
             self._bind_frame(frame, layer)
             self._draw_all(frame)
         context.disable_direct(CLIP_DISTANCE0)
@@ -171,12 +179,14 @@ class GBufferPass:
             camera_low=(*camera_low, 0.0),
             clip_from_relative=projection @ camera_from_relative,
             forward=(*-camera.rotation[:, 2], 0.0),
+            clip_start=camera.clip_start,
             clip_end=camera.clip_end,
             minimum_separation=frame.settings.minimum_separation,
             alpha_threshold=frame.settings.alpha_threshold,
             # N accumulated samples resolve √N times finer than one.
             texture_lod_bias=-0.5 * math.log2(max(frame.settings.samples, 1)),
             layer=layer,
+            orthographic=int(camera.orthographic),
         )
 
     def _upload_materials(self, scene: Scene) -> dict[str, int]:
@@ -202,13 +212,13 @@ def _program(channels: tuple[GBufferChannel, ...], defines: frozenset[str]) -> P
         defines=defines | {f"WRITE_{channel.name.upper()}" for channel in channels},
         blocks=(GBUFFER_UNIFORMS, MATERIAL_UNIFORMS),
         samplers=_SAMPLERS,
-        generated=(("outputs", outputs_glsl(channels)),),
+        generated=(("outputs", outputs_glsl(channels, oracle="PEEL" in defines)),),
     )
 
 
 def _pack_material(material: Material) -> bytes:
     return MATERIAL_UNIFORMS.pack(
         material_base_color=(*material.base_color, material.specular),
-        material_emission=(*material.emission, material.alpha),
+        material_emission=(*np.minimum(material.emission, np.finfo(np.float32).max), material.alpha),
         material_surface=(material.metallic, material.roughness, 0.0, 0.0),
     )

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What passes that shade every pixel share: one triangle over the viewport, the G-buffer and the camera bound."""
+
+import moderngl
+import numpy as np
+
+from ..device import Device
+from ..plan import PlannedPass
+from ..programs import ProgramSpec
+from ..uniforms import UniformBlock
+from .base import Frame, UniformBuffer
+
+CAMERA_UNIFORMS = UniformBlock(
+    "CameraUniforms",
+    (
+        ("world_from_camera", "mat4"),
+        ("camera_window", "vec4"),
+        ("camera_resolution", "vec2"),
+        ("camera_orthographic", "int"),
+    ),
+)
+
+_CHANNEL_SAMPLERS = {
+    "gbuffer.view_depth": "view_depth_layers",
+    "gbuffer.normal": "normal_layers",
+    "gbuffer.base_color": "base_color_layers",
+    "gbuffer.material": "material_layers",
+    "gbuffer.emission": "emission_layers",
+    "gbuffer.object_index": "object_index_layers",
+    "direct.radiance": "radiance_layers",
+}
+"""Target -> the sampler that shaders read it through."""
+
+_GGX_ALBEDO = "ggx_albedo_table"
+_CAMERA_BINDING, _PASS_BINDING = 0, 1
+
+
+def fullscreen_program(
+    fragment: str,
+    block: UniformBlock,
+    defines: frozenset[str],
+    *,
+    samplers: tuple[str, ...] = (),
+    generated: tuple[tuple[str, str], ...] = (),
+) -> ProgramSpec:
+    """A variant that draws over the viewport: the camera block, the pass's own, every target and more samplers."""
+    return ProgramSpec(
+        vertex="common/fullscreen.vert",
+        fragment=fragment,
+        defines=defines,
+        blocks=(CAMERA_UNIFORMS, block),
+        samplers=(*_CHANNEL_SAMPLERS.values(), _GGX_ALBEDO, *samplers),
+        generated=generated,
+    )
+
+
+class FullscreenDraw:
+    """Draws one triangle over the viewport; attribute-less vertex arrays are kept per program."""
+
+    def __init__(self, device: Device, block: UniformBlock) -> None:
+        self._device = device
+        self._camera = UniformBuffer(device, CAMERA_UNIFORMS)
+        self._uniforms = UniformBuffer(device, block)
+        self._vertex_arrays: dict[ProgramSpec, moderngl.VertexArray] = {}
+
+    def bind(self, frame: Frame, spec: ProgramSpec, planned: PlannedPass) -> None:
+        """Bind the camera, the targets that the pass reads and the GGX table."""
+        for name in planned.reads:
+            frame.pool.texture(name).use(spec.samplers.index(_CHANNEL_SAMPLERS[name]))
+        self._device.ggx_albedo.use(spec.samplers.index(_GGX_ALBEDO))
+        rotation = np.eye(4)
+        rotation[:3, :3] = frame.camera.rotation
+        self._camera.bind(
+            _CAMERA_BINDING,
+            world_from_camera=rotation,
+            camera_window=frame.camera.window,
+            camera_resolution=frame.pool.size,
+            camera_orthographic=int(frame.camera.orthographic),
+        )
+
+    def draw(self, spec: ProgramSpec, **uniforms: object) -> None:
+        """Draw with the pass's own uniforms into the bound framebuffer."""
+        if spec not in self._vertex_arrays:
+            self._vertex_arrays[spec] = self._device.context.vertex_array(self._device.programs.get(spec), [])
+        self._uniforms.bind(_PASS_BINDING, **uniforms)
+        self._vertex_arrays[spec].render(moderngl.TRIANGLES, vertices=3)
+
+    def release(self) -> None:
+        """Free the buffers and vertex arrays."""
+        self._camera.release()
+        self._uniforms.release()
+        for vertex_array in self._vertex_arrays.values():
+            vertex_array.release()
+        self._vertex_arrays.clear()
