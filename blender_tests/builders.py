@@ -50,7 +50,8 @@ def batch(mesh_key, matrices=None, materials=("white",), key=None, object_index=
     """Instances of a mesh; one at the origin by default."""
     matrices = np.eye(4)[None] if matrices is None else np.asarray(matrices, np.float64).reshape(-1, 4, 4)
     indices = np.full(len(matrices), object_index, np.int32)
-    return InstanceBatch(key or mesh_key, mesh_key, tuple(materials), 1, matrices, indices)
+    ids = np.arange(len(matrices), dtype=np.int64)
+    return InstanceBatch(key or mesh_key, mesh_key, tuple(materials), 1, matrices, indices, ids)
 
 
 def scene(*meshes, materials=(DIFFUSE,), lights=(), world=(0.0, 0.0, 0.0), batches=None, images=()):

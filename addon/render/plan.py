@@ -3,7 +3,7 @@
 
 from dataclasses import dataclass
 
-from ..scene import BaseColorSource, Channel, DebugView, Material, RenderSettings, Scene
+from ..scene import BaseColorSource, Channel, DebugView, LightKind, Material, RenderSettings, Scene
 from .layout import CHANNELS, ORACLES, GBufferChannel, TargetSpec
 
 
@@ -93,13 +93,23 @@ def plan(scene: Scene, settings: RenderSettings) -> Plan:
         writes=tuple(channel.target(layers) for channel in channels) + (ORACLES if layers > 1 else ()),
         defines=frozenset({"PEEL"} if layers > 1 else ()),
     )
-    passes = (gbuffer, *((direct,) if direct else ()), _plan_composite(settings, direct))
+    passes = (gbuffer, *((direct,) if direct else ()), _plan_composite(scene, settings, direct))
     return Plan(passes, tuple(left_out), layers, channels, settings.channels | {Channel.COMBINED})
 
 
 def is_emissive(material: Material) -> bool:
     """Whether a material emits light."""
     return max(material.emission) > 0.0
+
+
+def is_glossy(material: Material) -> bool:
+    """Whether a material reflects light other than diffusely."""
+    return material.specular > 0.0 or material.metallic > 0.0
+
+
+def has_glossy(scene: Scene) -> bool:
+    """Whether any material does."""
+    return any(is_glossy(material) for material in scene.materials.values())
 
 
 def is_alpha_tested(material: Material) -> bool:
@@ -140,27 +150,50 @@ def _plan_direct(scene: Scene, settings: RenderSettings, layers: int, left_out: 
     if settings.debug_view not in (DebugView.NONE, DebugView.DIRECT) and not settings.deep_output:
         left_out.append(LeftOut("direct", "the debug view shows the G-buffer only"))
         return None
-    defines: set[str] = set()
+    needs = _direct_needs(scene)
+    left_out += [LeftOut(f"direct {name.lower()}", reason) for name, (wanted, reason) in needs.items() if not wanted]
     reads = ["view_depth"]
     if lit:
         reads += ["normal", "base_color", "material"]
-    for define, wanted, reason in (
-        ("LIGHTS", bool(scene.lights), "no lights"),
-        ("WORLD", max(scene.world.radiance) > 0.0, "the world is black"),
-        ("EMISSION", emissive, "no emissive material"),
-    ):
-        if wanted:
-            defines.add(define)
-        else:
-            left_out.append(LeftOut(f"direct {define.lower()}", reason))
     if emissive:
         reads.append("emission")
     return PlannedPass(
         "direct",
         reads=tuple(f"gbuffer.{name}" for name in reads),
         writes=(TargetSpec("direct.radiance", 4, "f4", layers),),
-        defines=frozenset(defines),
+        defines=frozenset(name for name, (wanted, _) in needs.items() if wanted),
     )
+
+
+DIRECT_DEFINES = (
+    "SUN_LIGHTS",
+    "AREA_LIGHTS",
+    "SPHERE_LIGHTS",
+    "DISK_LIGHTS",
+    "SPOT_CONES",
+    "SPECULAR",
+    "WORLD",
+    "EMISSION",
+)
+"""What the direct pass compiles only where a scene has it: drivers that draw on the CPU run every branch they have."""
+
+
+def _direct_needs(scene: Scene) -> dict[str, tuple[bool, str]]:
+    """Per define of the direct pass, whether the scene needs it, and why not if it does not."""
+    kinds = {light.kind for light in scene.lights}
+    bulbs = {light.soft_falloff for light in scene.lights if light.kind in (LightKind.POINT, LightKind.SPOT)}
+    materials = scene.materials.values()
+    needed = (
+        (LightKind.SUN in kinds, "no sun"),
+        (LightKind.AREA in kinds, "no area light"),
+        (False in bulbs, "no point or spot light without soft falloff"),
+        (True in bulbs, "no point or spot light with soft falloff"),
+        (LightKind.SPOT in kinds, "no spot light"),
+        (has_glossy(scene), "no glossy material"),
+        (max(scene.world.radiance) > 0.0, "the world is black"),
+        (any(is_emissive(material) for material in materials), "no emissive material"),
+    )
+    return dict(zip(DIRECT_DEFINES, needed, strict=True))
 
 
 def _read_channels(
@@ -185,7 +218,7 @@ def _read_channels(
     return tuple(channel for channel in CHANNELS if channel.name in read)
 
 
-def _plan_composite(settings: RenderSettings, direct: PlannedPass | None) -> PlannedPass:
+def _plan_composite(scene: Scene, settings: RenderSettings, direct: PlannedPass | None) -> PlannedPass:
     defines: set[str] = set()
     if settings.debug_view is DebugView.NONE:
         defines |= {"DIRECT"} if direct else set[str]()
@@ -194,6 +227,8 @@ def _plan_composite(settings: RenderSettings, direct: PlannedPass | None) -> Pla
         if settings.debug_view is DebugView.DIRECT and not direct:
             defines.remove("DEBUG_DIRECT")
     defines |= {f"FILM_{channel.value}" for channel in settings.channels & MEAN_CHANNELS}
+    if Channel.DIFFUSE_COLOR in settings.channels and has_glossy(scene):
+        defines.add("SPECULAR")
     reads = {"view_depth"}.union(*(_FILM_CHANNELS[channel] for channel in settings.channels & MEAN_CHANNELS))
     if settings.debug_view in _DEBUG_CHANNELS:
         reads.add(_DEBUG_CHANNELS[settings.debug_view])

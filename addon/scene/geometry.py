@@ -3,7 +3,7 @@
 
 from dataclasses import dataclass
 
-from .arrays import Float32Array, Float64Array, Int32Array, UInt32Array
+from .arrays import Float32Array, Float64Array, Int32Array, Int64Array, UInt32Array
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,9 @@ class InstanceBatch:
     `materials` holds a key into `Scene.materials` per slot of the mesh (slot i uses `materials[min(i, last)]`).
     `matrices` (N, 4, 4) float64, row-major world-from-object, acting on column vectors.
     `object_index` (N,) int32: Blender's pass index.
-    `version` differs whenever matrices or indices differ from those of an earlier batch with the same `key`.
+    `ids` (N,) int64: which instance each row is, the same from frame to frame whatever other rows come or go;
+    rows of two frames with equal `mesh` and id show the same thing at two times.
+    `version` differs whenever any array differs from that of an earlier batch with the same `key`.
     """
 
     key: str
@@ -55,6 +57,7 @@ class InstanceBatch:
     version: int
     matrices: Float64Array
     object_index: Int32Array
+    ids: Int64Array
 
     @property
     def count(self) -> int:

@@ -9,14 +9,15 @@ import os
 import types
 import typing
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from enum import Enum
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .scene import Scene
+from .scene import Scene, Versions
+from .versions import new_version
 
 FORMAT_VERSION = 1
 _HEADER = "header"
@@ -43,18 +44,33 @@ def save(path: str | Path, scene: Scene) -> None:
 
 
 def load(path: str | Path) -> Scene:
-    """Read a scene. Raises OSError where the file cannot be read, SnapshotError where it is something else."""
+    """Read a scene; its items get version numbers of this process.
+
+    Raises OSError where the file cannot be read, SnapshotError where it is something else.
+    """
     try:
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         description = json.loads(arrays[_HEADER].tobytes())
         if description["format"] != FORMAT_VERSION:
             raise SnapshotError(f"{path}: snapshot format {description['format']}, expected {FORMAT_VERSION}")
-        return _restore(Scene, description["scene"], arrays)
+        return _with_own_versions(_restore(Scene, description["scene"], arrays))
     except (OSError, SnapshotError):
         raise
     except Exception as error:  # whatever a damaged archive makes numpy, zipfile or json raise
         raise SnapshotError(f"{path}: not a scene snapshot ({error})") from error
+
+
+def _with_own_versions(scene: Scene) -> Scene:
+    """The scene with numbers that nothing else in this process has: those in the file belong to another process."""
+    return replace(
+        scene,
+        meshes={key: replace(item, version=new_version()) for key, item in scene.meshes.items()},
+        materials={key: replace(item, version=new_version()) for key, item in scene.materials.items()},
+        images={key: replace(item, version=new_version()) for key, item in scene.images.items()},
+        batches=tuple(replace(item, version=new_version()) for item in scene.batches),
+        versions=Versions(*(new_version() for _ in fields(Versions))),
+    )
 
 
 def _describe(value: Any, arrays: dict[str, np.ndarray[Any, Any]]) -> Any:

@@ -89,7 +89,7 @@ def mesh(key: str, positions: np.ndarray, triangles: np.ndarray) -> Mesh:
 def batch(key: str, of: str, matrices: np.ndarray, first_index: int) -> InstanceBatch:
     """Instances of mesh `of` with consecutive pass indices."""
     indices = np.arange(first_index, first_index + len(matrices), dtype=np.int32)
-    return InstanceBatch(key, of, ("grey",), next(VERSIONS), matrices, indices)
+    return InstanceBatch(key, of, ("grey",), next(VERSIONS), matrices, indices, indices.astype(np.int64))
 
 
 def scene_of(meshes: list[Mesh], batches: list[InstanceBatch]) -> Scene:
@@ -227,6 +227,7 @@ def reordered(scene: Scene, generator: np.random.Generator) -> Scene:
                 key=f"{generator.integers(10**6)} {item.key}",
                 matrices=item.matrices[order],
                 object_index=item.object_index[order],
+                ids=item.ids[order],
             )
         )
     return replace(scene, meshes=meshes, batches=tuple(batches))

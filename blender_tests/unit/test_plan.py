@@ -5,7 +5,7 @@ import pytest
 
 from addon.render import plan
 from addon.render.layout import CHANNELS, DEPTH_BYTES
-from addon.scene import Channel, DebugView, RenderSettings
+from addon.scene import Channel, DebugView, LightKind, RenderSettings
 from blender_tests import builders
 
 SETTINGS = RenderSettings(64, 64, layers=4)
@@ -59,13 +59,30 @@ def test_nothing_to_light_with_means_no_direct_pass():
 
 
 def test_emission_and_world_are_compiled_only_where_there_are_any():
-    assert plan(LIT, SETTINGS).find("direct").defines == {"LIGHTS"}
+    assert plan(LIT, SETTINGS).find("direct").defines == {"SPHERE_LIGHTS"}
     world = builders.scene(builders.quad("q"), world=(0.1, 0.0, 0.0))
     assert plan(world, SETTINGS).find("direct").defines == {"WORLD"}
     lamp = builders.scene(builders.quad("q"), materials=(builders.material(emission=(1.0, 0, 0)),))
     planned = plan(lamp, SETTINGS)
     assert planned.find("direct").defines == {"EMISSION"}
     assert "gbuffer normal" in reasons(planned)
+
+
+@pytest.mark.parametrize(
+    ("light", "defines"),
+    [
+        (builders.light(LightKind.SUN), {"SUN_LIGHTS"}),
+        (builders.light(LightKind.AREA), {"AREA_LIGHTS"}),
+        (builders.light(LightKind.POINT, soft_falloff=True), {"DISK_LIGHTS"}),
+        (builders.light(LightKind.SPOT), {"SPHERE_LIGHTS", "SPOT_CONES"}),
+    ],
+)
+def test_only_the_kinds_of_light_there_are_get_compiled(light, defines):
+    scene = builders.scene(builders.quad("q"), lights=(light,))
+    assert plan(scene, SETTINGS).find("direct").defines == defines
+    glossy = builders.scene(builders.quad("q"), lights=(light,), materials=(builders.material(specular=0.04),))
+    assert plan(glossy, SETTINGS).find("direct").defines == defines | {"SPECULAR"}
+    assert "direct sun_lights" in reasons(plan(scene, SETTINGS)) or light.kind is LightKind.SUN
 
 
 def test_a_debug_view_of_the_gbuffer_needs_no_light():

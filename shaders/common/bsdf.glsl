@@ -50,6 +50,7 @@ vec3 directional_albedo(vec3 f0, vec2 albedo)
 /** The surface of a G-buffer texel: what the dielectric layer reflects is taken from the diffuse one below it. */
 Surface make_surface(vec3 base_color, float f0, float metallic, float roughness, float n_dot_v)
 {
+#ifdef SPECULAR
     vec2 albedo = lookup_ggx_albedo(roughness, n_dot_v);
     Surface surface;
     surface.specular_f0 = mix(vec3(f0), base_color, metallic);
@@ -58,6 +59,9 @@ Surface make_surface(vec3 base_color, float f0, float metallic, float roughness,
     surface.multiple_scattering = multiple_scattering_factor(surface.specular_f0, albedo);
     surface.alpha = max(roughness * roughness, SMALLEST_ALPHA);
     return surface;
+#else
+    return Surface(base_color, vec3(0.0), vec3(0.0), vec3(1.0), 1.0);
+#endif
 }
 
 /**

@@ -142,18 +142,35 @@ LightSample sample_sphere(Light light, vec3 to_light, float distance_squared, ve
 /** Sample a light from `position` with (u, v) in [0, 1)². An unlit sample has weight 0. */
 LightSample sample_light(Light light, vec3 position, vec2 u)
 {
+#ifdef SUN_LIGHTS
     if (light.kind == LIGHT_SUN)
         return sample_sun(light, u);
+#endif
+#ifdef AREA_LIGHTS
     if (light.kind == LIGHT_AREA)
         return sample_area(light, position, u);
+#endif
+    LightSample result = LightSample(-light.axis, vec3(0.0));
+#if defined(SPHERE_LIGHTS) || defined(DISK_LIGHTS)
     vec3 to_light = light.position - position;
     float distance_squared = dot(to_light, to_light);
     if (distance_squared == 0.0)
-        return LightSample(-light.axis, vec3(0.0));
-    LightSample result = light.spread_slope > 0.0 ? sample_facing_disk(light, to_light, distance_squared, u)
-                                                  : sample_sphere(light, to_light, distance_squared, u);
+        return result;
+#if defined(SPHERE_LIGHTS) && defined(DISK_LIGHTS)
+    if (light.spread_slope > 0.0)
+        result = sample_facing_disk(light, to_light, distance_squared, u);
+    else
+        result = sample_sphere(light, to_light, distance_squared, u);
+#elif defined(DISK_LIGHTS)
+    result = sample_facing_disk(light, to_light, distance_squared, u);
+#else
+    result = sample_sphere(light, to_light, distance_squared, u);
+#endif
+#ifdef SPOT_CONES
     if (light.kind == LIGHT_SPOT)
         result.weight *=
             smoothstep(0.0, 1.0, (-dot(result.direction, light.axis) - light.cone_cosine) / light.cone_softness);
+#endif
+#endif
     return result;
 }

@@ -9,6 +9,10 @@
 #include "common/octahedral.glsl"
 #include "generated/DirectUniforms.glsl"
 
+#if defined(SUN_LIGHTS) || defined(AREA_LIGHTS) || defined(SPHERE_LIGHTS) || defined(DISK_LIGHTS)
+#define LIGHTS
+#endif
+
 uniform sampler2DArray view_depth_layers;
 #if defined(LIGHTS) || defined(WORLD)
 uniform sampler2DArray normal_layers;
@@ -25,21 +29,25 @@ layout(location = 0) out vec4 out_radiance;
 /** Radiance towards the viewer that all lights cause. */
 vec3 lit_radiance(Surface surface, vec3 position, vec3 normal, vec3 view)
 {
-    bool specular = any(greaterThan(surface.specular_f0, vec3(0.0)));
+#ifdef SPECULAR
+    bool glossy = any(greaterThan(surface.specular_f0, vec3(0.0)));
     // Highlights take another light sample in every pixel: shared ones would show as separate dots on glossy surfaces.
     vec2 specular_sample = fract(light_sample + hash_to_unit(uvec2(gl_FragCoord.xy)));
+#endif
     vec3 radiance = vec3(0.0);
     for (int index = 0; index < light_count; ++index) {
         Light light = fetch_light(index);
         LightSample incident = sample_light(light, position, light_sample);
         float cosine = max(dot(normal, incident.direction), 0.0);
         radiance += surface.diffuse_albedo / PI * incident.weight * (cosine * light.diffuse_factor);
-        if (!specular)
+#ifdef SPECULAR
+        if (!glossy)
             continue;
         if (is_extended(light))
             incident = sample_light(light, position, specular_sample);
         radiance += specular_brdf_cosine(surface, normal, view, incident.direction) * incident.weight
                     * light.specular_factor;
+#endif
     }
     return radiance;
 }

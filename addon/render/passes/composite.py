@@ -29,6 +29,8 @@ class CompositePass:
         for film in subsets(f"FILM_{channel.value}" for channel in SUM_CHANNELS if channel is not Channel.COMBINED):
             for view in shown:
                 yield _program(film | view)
+                if "FILM_DIFFUSE_COLOR" in film:
+                    yield _program(film | view | {"SPECULAR"})
 
     def prepare(self, frame: Frame, planned: PlannedPass) -> None:
         """Nothing but uniforms, which `run` writes."""

@@ -7,7 +7,7 @@ import moderngl
 
 from ..device import Device
 from ..light_table import LIGHTS_PER_ROW, TEXELS_PER_LIGHT, light_table
-from ..plan import PlannedPass
+from ..plan import DIRECT_DEFINES, PlannedPass
 from ..programs import ProgramSpec
 from ..uniforms import UniformBlock
 from .base import Frame, subsets
@@ -31,17 +31,15 @@ class DirectPass:
 
     @classmethod
     def variants(cls) -> Iterator[ProgramSpec]:
-        """Every combination of light sources."""
-        for defines in subsets(("LIGHTS", "WORLD", "EMISSION")):
-            if defines:
-                yield _program(defines)
+        """Every combination of what a scene may have."""
+        yield from (_program(defines) for defines in subsets(DIRECT_DEFINES) if defines)
 
     def prepare(self, frame: Frame, planned: PlannedPass) -> None:
         """Upload the light table."""
         if self._lights is not None:
             self._lights.release()
             self._lights = None
-        if "LIGHTS" in planned.defines:
+        if frame.scene.lights:
             table = light_table(frame.scene.lights, frame.camera.position)
             self._lights = self._device.context.texture((table.shape[1], table.shape[0]), 4, table, dtype="f4")
             self._lights.filter = (moderngl.NEAREST, moderngl.NEAREST)
