@@ -12,7 +12,7 @@ from typing import Any
 import bpy
 
 from ..scene import Camera, Scene
-from ..sync import Mirror, render_camera, viewport_camera
+from ..sync import Mirror, render_camera, viewport_camera, without_hidden
 from . import messages, regions, sessions, settings, statistics
 from .presenter import Presenter
 from .viewport_session import ViewportSession
@@ -40,21 +40,22 @@ class Viewport:
         """Whether there is something newer to paint than what was painted last."""
         return self.session.revision != self._drawn
 
-    def sync(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Read the scene again. A scene in which nothing that viewports show changed is not taken over."""
+    def sync(self, depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView3D) -> None:
+        """Read the scene again. A scene in which nothing that the viewport shows changed is not taken over."""
         mirror = sessions.viewport_mirror(depsgraph)
-        synced = mirror.sync(depsgraph)
-        scene, self._warnings, self._fault = synced.scene, synced.warnings, None
+        synced = mirror.sync(depsgraph, space)
+        scene = without_hidden(synced.scene, synced.hidden, self._scene)
+        self._warnings, self._fault = synced.warnings, None
         if mirror is not self._mirror or replace(scene.versions, camera=0) != replace(self._scene.versions, camera=0):
             self._mirror, self._scene = mirror, scene
 
     def draw(self, engine: bpy.types.RenderEngine, context: Any, depsgraph: Any) -> None:
         """Ask for the current view and paint the newest picture."""
         if self._mirror is not sessions.viewport_mirror(depsgraph):
-            self.sync(depsgraph)
+            self.sync(depsgraph, context.space_data)
         region = context.region
         space = context.space_data
-        view = viewport_camera(depsgraph, space, region, context.region_data)
+        view = viewport_camera(depsgraph, space, context.region_data)
         frame = _frame(context, depsgraph)
         rectangle = regions.viewport_rectangle(depsgraph.scene, space, region, view, frame)
         if rectangle.empty:
@@ -97,7 +98,7 @@ def update(context: Any, depsgraph: bpy.types.Depsgraph) -> None:
     """Blender's data changed: read it again."""
     viewport = _viewport(context.region)
     try:
-        viewport.sync(depsgraph)
+        viewport.sync(depsgraph, context.space_data)
     except Exception as error:  # Blender would print it and go on showing the old scene
         viewport.fail(error)
 

@@ -15,7 +15,7 @@ class Camera:
     `world_from_camera` (4, 4) float64, rigid (no scale).
     `window` (left, right, bottom, top): the image rectangle in camera space, at view depth 1 for a perspective
     camera, at any depth for an orthographic one. Lens shift, sensor fit, render border and viewport pan are
-    all already in it.
+    all already in it. A window with left > right mirrors the picture, as a camera with a negative scale does.
     `clip_start`, `clip_end`: view depths in metres.
     """
 

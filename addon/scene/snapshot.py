@@ -19,7 +19,7 @@ import numpy as np
 from .scene import Scene, Versions
 from .versions import new_version
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 _HEADER = "header"
 
 

@@ -3,5 +3,6 @@
 
 from .camera import render_camera, viewport_camera
 from .mirror import Mirror, SyncResult
+from .visibility import without_hidden
 
-__all__ = ["Mirror", "SyncResult", "render_camera", "viewport_camera"]
+__all__ = ["Mirror", "SyncResult", "render_camera", "viewport_camera", "without_hidden"]

@@ -37,9 +37,10 @@ def render_camera(depsgraph: bpy.types.Depsgraph, resolution_x: int, resolution_
             scale_y=scene.render.pixel_aspect_y,
         )
     )
+    pose, mirrored = _pose(_matrix(camera.matrix_world))
     return Camera(
-        world_from_camera=rigid_matrix(_matrix(camera.matrix_world)),
-        window=_window(projection),
+        world_from_camera=pose,
+        window=_window(projection, mirrored=mirrored),
         clip_start=camera.data.clip_start,
         clip_end=camera.data.clip_end,
         orthographic=_is_orthographic(projection),
@@ -63,17 +64,16 @@ def camera_messages(depsgraph: bpy.types.Depsgraph, messages: Messages) -> None:
 def viewport_camera(
     depsgraph: bpy.types.Depsgraph,
     space: bpy.types.SpaceView3D,
-    region: bpy.types.Region,
     region_3d: bpy.types.RegionView3D,
 ) -> Camera:
     """The camera of a viewport: free perspective or orthographic view, or camera view with its zoom and offset.
 
     Everything but the clip range is read off `region_3d`'s own matrices, so that what is drawn lies where Blender's
-    overlays lie. `region` is not read: `region_3d` has its shape.
+    overlays lie.
     """
     projection = _matrix(region_3d.window_matrix)
-    pose = rigid_matrix(_matrix(np.linalg.inv(_matrix(region_3d.view_matrix))))
-    window = _window(projection)
+    pose, mirrored = _pose(_matrix(np.linalg.inv(_matrix(region_3d.view_matrix))))
+    window = _window(projection, mirrored=mirrored)
     orthographic = _is_orthographic(projection)
     if orthographic and region_3d.view_perspective != "CAMERA":
         return _orthographic_view(pose, projection, window)
@@ -113,15 +113,24 @@ def _is_orthographic(projection: Float64Array) -> bool:
     return bool(projection[3, 3] == 1.0)
 
 
-def _window(projection: Float64Array) -> tuple[float, float, float, float]:
-    """The image rectangle (left, right, bottom, top) of an OpenGL projection matrix, at view depth 1."""
+def _pose(matrix: Float64Array) -> tuple[Float64Array, bool]:
+    """The rigid part of a camera's matrix, and whether the matrix also mirrors left and right of the picture."""
+    return rigid_matrix(matrix), bool(np.linalg.det(matrix[:3, :3]) < 0.0)
+
+
+def _window(projection: Float64Array, *, mirrored: bool) -> tuple[float, float, float, float]:
+    """The image rectangle (left, right, bottom, top) of an OpenGL projection matrix, at view depth 1.
+
+    In a mirrored picture left is where +X is, so that left > right.
+    """
     column = 3 if _is_orthographic(projection) else 2
     sign = -1.0 if column == 3 else 1.0
     scale_x, scale_y = projection[0, 0], projection[1, 1]
     shift_x, shift_y = sign * projection[0, column], sign * projection[1, column]
+    side = -1.0 if mirrored else 1.0
     return (
-        float((shift_x - 1.0) / scale_x),
-        float((shift_x + 1.0) / scale_x),
+        float(side * (shift_x - 1.0) / scale_x),
+        float(side * (shift_x + 1.0) / scale_x),
         float((shift_y - 1.0) / scale_y),
         float((shift_y + 1.0) / scale_y),
     )

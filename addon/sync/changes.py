@@ -1,26 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Versions, and the texts that tell the user what could not be mirrored."""
+"""Versions of what is mirrored, and the texts that tell the user what could not be mirrored."""
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterable
-from dataclasses import fields
+from collections.abc import Iterable, Mapping
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..scene import InstanceBatch, Light, Scene
+from ..scene.versions import new_version
+
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
-
-_versions = itertools.count(1)
-
-
-def new_version() -> int:
-    """A version number that this process has never used, so that an item which vanishes and returns (undo),
-    or is mirrored twice, never shows an old number with new data."""
-    return next(_versions)
 
 
 def same_array(first: NDArray[np.generic] | None, second: NDArray[np.generic] | None) -> bool:
@@ -46,6 +40,36 @@ def same_fields(first: DataclassInstance | None, second: DataclassInstance | Non
         same_array(a, b) if isinstance(a, np.ndarray) else a == b
         for a, b in ((getattr(first, field.name), getattr(second, field.name)) for field in fields(first))
     )
+
+
+def with_versions(scene: Scene, previous: Scene) -> Scene:
+    """`scene` with versions raised where it differs from `previous`, or `previous` itself."""
+    changed = {
+        "geometry": not _same_items(scene.meshes, previous.meshes),
+        "transforms": not _same_batches(scene.batches, previous.batches),
+        "materials": not (
+            _same_items(scene.materials, previous.materials) and _same_items(scene.images, previous.images)
+        ),
+        "lights": not _same_lights(scene.lights, previous.lights),
+        "camera": not same_fields(scene.camera, previous.camera),
+        "world": scene.world != previous.world,
+    }
+    raised = {name: new_version() for name, differs in changed.items() if differs}
+    if not raised:
+        return previous
+    return replace(scene, versions=replace(previous.versions, **raised))
+
+
+def _same_items(first: Mapping[str, object], second: Mapping[str, object]) -> bool:
+    return first.keys() == second.keys() and all(first[key] is second[key] for key in first)
+
+
+def _same_batches(first: tuple[InstanceBatch, ...], second: tuple[InstanceBatch, ...]) -> bool:
+    return len(first) == len(second) and all(a is b for a, b in zip(first, second, strict=True))
+
+
+def _same_lights(first: tuple[Light, ...], second: tuple[Light, ...]) -> bool:
+    return len(first) == len(second) and all(same_fields(a, b) for a, b in zip(first, second, strict=True))
 
 
 class Messages:

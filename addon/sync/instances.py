@@ -14,8 +14,9 @@ import bpy
 import numpy as np
 
 from ..scene import InstanceBatch
-from ..scene.arrays import BoolArray, Float64Array, Int32Array
-from .changes import Messages, new_version, same_array
+from ..scene.arrays import BoolArray, Float64Array
+from .changes import Messages, new_version
+from .visibility import same_batch
 
 _FLATTEST = 1e-5
 
@@ -24,16 +25,21 @@ _FLATTEST = 1e-5
 class Placements:
     """The instances of one mesh with one assignment of materials: rows of the depsgraph's list, in its order."""
 
+    key: str
     mesh: str
     materials: tuple[str, ...]
     rows: list[int] = field(default_factory=list)
     object_index: list[int] = field(default_factory=list)
+    ids: list[int] = field(default_factory=list)
+    hidden: list[bool] = field(default_factory=list)
     names: set[str] = field(default_factory=set)
 
-    @property
-    def key(self) -> str:
-        """Key of the batch."""
-        return "|".join((self.mesh, *self.materials))
+    def add(self, row: int, object_index: int, identifier: int, *, hidden: bool) -> None:
+        """One more instance; see `InstanceBatch`. `hidden`: the viewport does not show it."""
+        self.rows.append(row)
+        self.object_index.append(object_index)
+        self.ids.append(identifier)
+        self.hidden.append(hidden)
 
 
 def read_matrices(depsgraph: bpy.types.Depsgraph) -> Float64Array:
@@ -71,29 +77,25 @@ def shown_instances(depsgraph: bpy.types.Depsgraph) -> Iterator[tuple[int, Any, 
 
 def build_batch(
     placements: Placements, matrices: Float64Array, previous: InstanceBatch | None, messages: Messages
-) -> InstanceBatch | None:
-    """The batch of a group: `previous` itself where nothing changed, None where no instance can be drawn."""
+) -> tuple[InstanceBatch, BoolArray]:
+    """The batch of a group, `previous` itself where nothing changed, and which rows (N,) the viewport does not show.
+
+    Instances that cannot be drawn are not in it, so there may be none.
+    """
     own = matrices[np.array(placements.rows, np.intp)]
-    object_index = np.array(placements.object_index, np.int32)
     usable = _repair(own, placements, messages)
-    if not usable.all():
-        own, object_index = own[usable], object_index[usable]
-    if len(own) == 0:
-        return None
-    if previous is not None and _same_batch(previous, own, object_index):
-        return previous
-    return InstanceBatch(
+    kept = slice(None) if usable.all() else usable
+    batch = InstanceBatch(
         key=placements.key,
         mesh=placements.mesh,
         materials=placements.materials,
         version=new_version(),
-        matrices=own,
-        object_index=object_index,
+        matrices=own[kept],
+        object_index=np.array(placements.object_index, np.int32)[kept],
+        ids=np.array(placements.ids, np.int64)[kept],
     )
-
-
-def _same_batch(batch: InstanceBatch, matrices: Float64Array, object_index: Int32Array) -> bool:
-    return same_array(batch.matrices, matrices) and same_array(batch.object_index, object_index)
+    hidden = np.array(placements.hidden, np.bool_)[kept]
+    return (previous if previous is not None and same_batch(previous, batch) else batch), hidden
 
 
 def _repair(matrices: Float64Array, placements: Placements, messages: Messages) -> BoolArray:

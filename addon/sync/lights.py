@@ -20,8 +20,13 @@ if TYPE_CHECKING:
 def read_light(
     key: str, shown: bpy.types.Object, matrix: Float64Array, images: ImageTable, messages: Messages
 ) -> Light | None:
-    """The light of an evaluated object or instance with world matrix `matrix` (4, 4); None where that is broken."""
+    """The light of an evaluated object or instance with world matrix `matrix` (4, 4).
+
+    None where the matrix is broken, and for Cycles' portals: they guide its sampling and do not shine.
+    """
     light: Any = shown.data
+    if light.type == "AREA" and hasattr(light, "cycles") and light.cycles.is_portal:
+        return None
     name = shown.name
     axes = matrix[:3, :3]
     lengths = np.linalg.norm(axes, axis=0)

@@ -4,18 +4,20 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ..scene import InstanceBatch, Light, Scene
+from ..scene import InstanceBatch, Light, Material, Scene
+from ..scene.arrays import BoolArray
 from .camera import camera_messages, render_camera
-from .changes import Messages, new_version, same_fields
+from .changes import Messages, with_versions
+from .effects import effect_messages
 from .instances import Placements, build_batch, read_matrices, shown_instances
-from .keys import MeshKeys, id_key, instance_key
+from .keys import MeshKeys, batch_key, id_key, instance_id, instance_key
 from .lights import read_light
 from .materials import MaterialTable
 from .meshes import MeshRecord, update_mesh
+from .visibility import Hidden, Visibility
 from .world import read_world
 
 if TYPE_CHECKING:
@@ -34,11 +36,13 @@ _NO_FACES = "These have no faces and are not seen:"
 
 @dataclass(frozen=True)
 class SyncResult:
-    """A frozen scene, what could not be mirrored (complete sentences), and how long mirroring took."""
+    """A frozen scene, what could not be mirrored (complete sentences), how long mirroring took, and what of the
+    scene the viewport does not show for which it was mirrored (nothing without one)."""
 
     scene: Scene
     warnings: tuple[str, ...]
     seconds: float
+    hidden: Hidden
 
 
 class Mirror:
@@ -53,17 +57,21 @@ class Mirror:
         self._meshes: dict[str, MeshRecord] = {}
         self._materials = MaterialTable()
 
-    def sync(self, depsgraph: bpy.types.Depsgraph) -> SyncResult:
-        """Compare with `depsgraph` and return the scene as it is now; the same `Scene` where nothing changed."""
+    def sync(self, depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView3D | None = None) -> SyncResult:
+        """Compare with `depsgraph` and return the scene as it is now; the same `Scene` where nothing changed.
+
+        The scene is that of all viewports together. What `space`, one of them, does not show of it is told apart,
+        so that viewports in local view share their meshes with the others; `without_hidden` takes it away.
+        """
         start = time.perf_counter()
         messages = Messages()
         self._materials.begin(_updated_images(depsgraph), messages)
-        gathering = _Gathering(depsgraph, self._meshes, self._materials, messages)
+        gathering = _Gathering(depsgraph, space, self._meshes, self._materials, messages)
         gathering.run()
         self._meshes = gathering.meshes
-        batches = gathering.batches({batch.key: batch for batch in self._scene.batches})
+        batches, hidden = gathering.batches({batch.key: batch for batch in self._scene.batches})
         blender_scene: Any = depsgraph.scene_eval
-        world = read_world(blender_scene.world, self._materials.images, messages)
+        world = read_world(depsgraph, self._materials.images, messages)
         materials, images = self._materials.collect()
         camera_messages(depsgraph, messages)
         render = blender_scene.render
@@ -78,8 +86,10 @@ class Mirror:
             world=world,
             camera=render_camera(depsgraph, max(width, 1), max(height, 1)),
         )
-        self._scene = _with_versions(scene, self._scene)
-        return SyncResult(self._scene, messages.texts(), time.perf_counter() - start)
+        if space is None:
+            effect_messages(depsgraph, scene, messages)
+        self._scene = with_versions(scene, self._scene)
+        return SyncResult(self._scene, messages.texts(), time.perf_counter() - start, hidden)
 
 
 class _Gathering:
@@ -88,20 +98,23 @@ class _Gathering:
     def __init__(
         self,
         depsgraph: bpy.types.Depsgraph,
+        space: bpy.types.SpaceView3D | None,
         previous: dict[str, MeshRecord],
         materials: MaterialTable,
         messages: Messages,
     ) -> None:
         self.meshes: dict[str, MeshRecord] = {}
         self.lights: list[Light] = []
+        self._hidden_lights: set[str] = set()
         self._depsgraph = depsgraph
         self._previous = previous
         self._materials = materials
         self._messages = messages
         view_layer: Any = depsgraph.view_layer_eval
         self._override = view_layer.material_override
+        self._visibility = Visibility(depsgraph, space, messages)
         self._matrices = read_matrices(depsgraph)
-        self._seen: dict[tuple[int, int], tuple[Placements, int] | None] = {}
+        self._drawn: dict[tuple[int, int], tuple[Placements, int] | None] = {}
         self._placements: dict[tuple[str, tuple[str, ...]], Placements] = {}
         self._mesh_keys = MeshKeys()
 
@@ -112,32 +125,45 @@ class _Gathering:
             if kind == "MESH":
                 self._place(row, instance, shown)
             elif kind == "LIGHT":
-                key = instance_key(instance)
-                light = read_light(key, shown, self._matrices[row], self._materials.images, self._messages)
-                if light is not None:
-                    self.lights.append(light)
+                self._add_light(row, instance_key(instance), shown)
             elif kind in _UNSUPPORTED:
                 self._messages.add_named(_UNSUPPORTED[kind], shown.name)
 
-    def batches(self, previous: dict[str, InstanceBatch]) -> tuple[InstanceBatch, ...]:
-        """The placements as batches in the order of their keys."""
-        ordered = sorted(self._placements.values(), key=lambda placements: placements.key)
-        built = (build_batch(p, self._matrices, previous.get(p.key), self._messages) for p in ordered)
-        return tuple(batch for batch in built if batch is not None)
+    def batches(self, previous: dict[str, InstanceBatch]) -> tuple[tuple[InstanceBatch, ...], Hidden]:
+        """The placements as batches in the order of their keys, and what of them and the lights is hidden."""
+        batches: list[InstanceBatch] = []
+        hidden: dict[str, BoolArray] = {}
+        for placements in sorted(self._placements.values(), key=lambda placements: placements.key):
+            batch, rows = build_batch(placements, self._matrices, previous.get(placements.key), self._messages)
+            if batch.count:
+                batches.append(batch)
+                if rows.any():
+                    hidden[batch.key] = rows
+        return tuple(batches), Hidden(hidden, frozenset(self._hidden_lights))
+
+    def _add_light(self, row: int, key: str, shown: Any) -> None:
+        light = read_light(key, shown, self._matrices[row], self._materials.images, self._messages)
+        if light is not None:
+            self.lights.append(light)
+            if not self._visibility.shows(shown):
+                self._hidden_lights.add(key)
 
     def _place(self, row: int, instance: Any, shown: Any) -> None:
-        uid = shown.original.session_uid
-        identity = (shown.data.as_pointer(), uid)
-        if identity not in self._seen:
-            self._seen[identity] = self._first(instance, shown)
-        entry = self._seen[identity]
+        placer = self._visibility.placer(instance, shown)
+        if not placer.seen_by_camera:
+            return
+        identity = (shown.data.as_pointer(), shown.original.session_uid)
+        if identity not in self._drawn:
+            self._drawn[identity] = self._first(instance, shown)
+        entry = self._drawn[identity]
         if entry is not None:
             placements, object_index = entry
-            placements.rows.append(row)
-            placements.object_index.append(object_index)
+            placements.add(row, object_index, instance_id(instance, placer.uid), hidden=not placer.shown_in_viewport)
 
     def _first(self, instance: Any, shown: Any) -> tuple[Placements, int] | None:
         """What all instances of one object with one mesh share; None where there is nothing to draw."""
+        if not shown.visible_camera:
+            return None
         if not instance.is_instance and _has_hair(shown):
             self._messages.add_named(_HAIR, shown.name)
         mesh = shown.data
@@ -145,27 +171,29 @@ class _Gathering:
             if not (instance.is_instance or _is_instancer(shown)):
                 self._messages.add_named(_NO_FACES, shown.name)
             return None
-        materials, attribute = self._slot_materials(shown)
-        key = self._mesh_keys.key(shown)
+        slots, attribute = self._slot_materials(shown)
+        materials = tuple(material.key for material in slots)
+        key, name = self._mesh_keys.key(shown)
         if key not in self.meshes:
             self.meshes[key] = update_mesh(key, shown.name, mesh, attribute, self._previous.get(key))
             self._messages.extend(key, self.meshes[key].warnings)
         if not self.meshes[key].mesh.slots:
             return None
         if (key, materials) not in self._placements:
-            self._placements[key, materials] = Placements(key, materials)
+            names = (name, *(material.name for material in slots))
+            self._placements[key, materials] = Placements(batch_key(names, key, materials), key, materials)
         placements = self._placements[key, materials]
         placements.names.add(shown.name)
         return placements, shown.pass_index
 
-    def _slot_materials(self, shown: Any) -> tuple[tuple[str, ...], str | None]:
-        """Keys of the materials in an object's slots, and the colour attribute that the first of them reads."""
+    def _slot_materials(self, shown: Any) -> tuple[tuple[Material, ...], str | None]:
+        """The materials in an object's slots, and the colour attribute that the first of them reads."""
         slots = [slot.material for slot in shown.material_slots] or [None]
         if self._override is not None:
             slots = [self._override]
         records = [self._materials.use(material) for material in slots]
         attribute = next((record.attribute for record in records if record.attribute is not None), None)
-        return tuple(record.material.key for record in records), attribute
+        return tuple(record.material for record in records), attribute
 
 
 def _has_hair(shown: Any) -> bool:
@@ -181,33 +209,3 @@ def _is_instancer(shown: Any) -> bool:
 def _updated_images(depsgraph: bpy.types.Depsgraph) -> frozenset[str]:
     updated: list[Any] = [update.id for update in depsgraph.updates]
     return frozenset(id_key("image", item) for item in updated if item.bl_rna.identifier == "Image")
-
-
-def _with_versions(scene: Scene, previous: Scene) -> Scene:
-    """`scene` with versions raised where it differs from `previous`, or `previous` itself."""
-    changed = {
-        "geometry": not _same_items(scene.meshes, previous.meshes),
-        "transforms": not _same_batches(scene.batches, previous.batches),
-        "materials": not (
-            _same_items(scene.materials, previous.materials) and _same_items(scene.images, previous.images)
-        ),
-        "lights": not _same_lights(scene.lights, previous.lights),
-        "camera": not same_fields(scene.camera, previous.camera),
-        "world": scene.world != previous.world,
-    }
-    raised = {name: new_version() for name, differs in changed.items() if differs}
-    if not raised:
-        return previous
-    return replace(scene, versions=replace(previous.versions, **raised))
-
-
-def _same_items(first: Mapping[str, object], second: Mapping[str, object]) -> bool:
-    return first.keys() == second.keys() and all(first[key] is second[key] for key in first)
-
-
-def _same_batches(first: tuple[InstanceBatch, ...], second: tuple[InstanceBatch, ...]) -> bool:
-    return len(first) == len(second) and all(a is b for a, b in zip(first, second, strict=True))
-
-
-def _same_lights(first: tuple[Light, ...], second: tuple[Light, ...]) -> bool:
-    return len(first) == len(second) and all(same_fields(a, b) for a, b in zip(first, second, strict=True))

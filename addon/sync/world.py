@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..scene import World
 from .changes import Messages
@@ -13,9 +13,16 @@ if TYPE_CHECKING:
     import bpy
 
 
-def read_world(world: bpy.types.World | None, images: ImageTable, messages: Messages) -> World:
-    """The world's radiance: black without a world or surface, a mean (with a message) where it is not constant."""
-    if world is None:
+def read_world(depsgraph: bpy.types.Depsgraph, images: ImageTable, messages: Messages) -> World:
+    """The radiance of the view layer's world, its own or the scene's.
+
+    Black where the layer has no Environment and without a world or surface; a mean (with a message) where it is not
+    constant.
+    """
+    scene: Any = depsgraph.scene_eval
+    view_layer: Any = depsgraph.view_layer_eval
+    world = view_layer.world_override or scene.world
+    if world is None or not view_layer.use_sky:
         return World()
     if not has_nodes(world):
         red, green, blue = world.color

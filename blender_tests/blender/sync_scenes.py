@@ -69,8 +69,9 @@ def make_material(name: str, shader: str | None = None, **inputs: object):
 
 
 def mirrored_material(material: bpy.types.Material | None) -> tuple[Material, Scene, tuple[str, ...]]:
-    """What a material becomes on an object that has only it."""
+    """What a material becomes on an object that has only it, and a UV map."""
     thing = make_object()
+    thing.data.uv_layers.new()
     thing.data.materials.append(material)
     result = sync()
     (batch,) = result.scene.batches

@@ -100,7 +100,7 @@ def test_a_process_that_forgets_to_unregister_ends(registered):
 def test_every_property_tells_what_it_is(registered):
     settings = bpy.context.scene.deep_gbuffer
     own = [item for item in settings.bl_rna.properties if item.identifier not in {"rna_type", "name"}]
-    assert len(own) == 11
+    assert len(own) == 12
     for item in own:
         assert len(item.description) > 15, item.identifier
         assert not item.description.endswith("."), item.identifier

@@ -209,6 +209,11 @@ class StubEngine:
         self.stats.append(texts)
 
 
+def unshown_viewports():
+    """The viewports of all workspaces; in background mode none is shown."""
+    return [area for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D"]
+
+
 def stub_context():
     """A viewport that looks down as the scene's camera does."""
     region = SimpleNamespace(width=WIDTH, height=HEIGHT, as_pointer=lambda: 1)
@@ -216,7 +221,8 @@ def stub_context():
     region_3d = SimpleNamespace(
         view_matrix=mathutils.Matrix.Translation((0, 0, -5)), window_matrix=window, view_perspective="PERSP"
     )
-    space = SimpleNamespace(use_render_border=False, use_local_camera=False, clip_start=0.1, clip_end=100.0)
+    space = unshown_viewports()[0].spaces.active
+    space.clip_start, space.clip_end = 0.1, 100.0
     return SimpleNamespace(region=region, region_data=region_3d, space_data=space)
 
 
@@ -285,6 +291,21 @@ def test_a_fault_while_reading_the_scene_is_painted_until_it_can_be_read(with_gp
         assert engine.stats == [("", "Sample 16/16")]
 
     with_gpu(work)
+
+
+def test_each_viewport_shows_what_its_own_space_lets_through(plane_scene):
+    first, second = (area.spaces.active for area in unshown_viewports()[:2])
+    second.show_object_viewport_mesh = False
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    whole, filtered = viewport.Viewport(), viewport.Viewport()
+    for each, space in ((whole, first), (filtered, second), (whole, first)):
+        each.sync(depsgraph, space)
+    assert (len(whole._scene.batches), len(filtered._scene.batches)) == (1, 0)
+    assert whole._scene.meshes.keys() == filtered._scene.meshes.keys()
+    assert all(filtered._scene.meshes[key] is mesh for key, mesh in whole._scene.meshes.items())
+    second.show_object_viewport_mesh = True
+    filtered.sync(depsgraph, second)
+    assert filtered._scene is whole._scene
 
 
 def test_the_status_names_the_first_warning():

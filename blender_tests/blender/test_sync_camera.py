@@ -61,6 +61,31 @@ def test_projection_equals_blenders(empty_scene, kind, fit, resolution, aspect, 
         np.testing.assert_allclose(project(mirrored, point), expected, rtol=2e-4, atol=2e-4)
 
 
+@pytest.mark.parametrize("scale", [(-1, 1, 1), (1, -2, 1), (1, 1, -1), (-1, -1, 1), (-1, -1, -3)])
+@pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
+def test_a_camera_that_is_mirrored_mirrors_the_picture(empty_scene, scale, kind):
+    """As in Blender and Cycles, which normalise the matrix's columns and keep their signs."""
+    camera = add_camera(empty_scene)
+    camera.data.type, camera.data.shift_x, camera.data.shift_y = kind, 0.2, -0.1
+    camera.location, camera.rotation_euler, camera.scale = (1, 2, 3), (0.5, 0.1, 0.7), scale
+    graph = depsgraph()
+    mirrored = render_camera(graph, 300, 200)
+    assert np.linalg.det(mirrored.rotation) == pytest.approx(1.0)
+    frame = camera.matrix_world.copy()
+    for column in range(3):
+        frame.col[column] = frame.col[column].normalized()
+    projection = camera.calc_matrix_camera(graph, x=300, y=200)
+    space, region_3d = viewport(projection, frame.inverted(), "CAMERA")
+    for offset in ((0.3, 0.1, -2.0), (-1.0, 0.7, -5.0)):
+        point = frame @ Vector(offset)
+        clip = projection @ Vector((*offset, 1.0))
+        expected = [clip.x / clip.w * 0.5 + 0.5, clip.y / clip.w * 0.5 + 0.5, -offset[2]]
+        np.testing.assert_allclose(project(mirrored, point), expected, atol=1e-5)
+        np.testing.assert_allclose(project(viewport_camera(graph, space, region_3d), point), expected, atol=1e-5)
+        left = project(mirrored.cropped(0.0, 0.5, 0.0, 1.0), point)
+        np.testing.assert_allclose(left, (2 * expected[0], *expected[1:]), atol=1e-5)
+
+
 def test_synced_camera_has_the_scenes_resolution(empty_scene):
     camera = add_camera(empty_scene)
     camera.data.clip_start, camera.data.clip_end = 0.25, 77.0
@@ -97,7 +122,7 @@ def test_viewport_camera_view_follows_zoom_and_offset(empty_scene, kind):
     zoom = Matrix.Translation((0.3, -0.2, 0)) @ Matrix.Diagonal((0.5, 0.6, 1, 1))
     window = zoom @ camera.calc_matrix_camera(graph, x=300, y=200)
     space, region_3d = viewport(window, camera.matrix_world.inverted(), "CAMERA")
-    mirrored = viewport_camera(graph, space, None, region_3d)
+    mirrored = viewport_camera(graph, space, region_3d)
     assert mirrored.clip_start == pytest.approx(camera.data.clip_start, rel=1e-4)
     assert mirrored.orthographic == (kind == "ORTHO")
     for offset in ((0.3, 0.1, -2.0), (-1.0, 0.7, -5.0)):
@@ -111,7 +136,7 @@ def test_free_orthographic_view_sees_behind_itself(empty_scene):
     window = Matrix(((0.2, 0, 0, 0.1), (0, 0.3, 0, -0.1), (0, 0, -2 / 1000, 0), (0, 0, 0, 1)))
     view = Matrix.LocRotScale(Vector((1, 2, -9)), Euler((0.4, 0.2, 0.9)), None)
     space, region_3d = viewport(window, view, "ORTHO")
-    mirrored = viewport_camera(depsgraph(), space, None, region_3d)
+    mirrored = viewport_camera(depsgraph(), space, region_3d)
     behind = view.inverted() @ Vector((0.5, -0.5, 400.0))
     x, y, depth = project(mirrored, behind)
     assert mirrored.clip_start < depth < mirrored.clip_end
@@ -121,6 +146,6 @@ def test_free_orthographic_view_sees_behind_itself(empty_scene):
 def test_free_perspective_takes_the_spaces_clip_range(empty_scene):
     window = Matrix(((1.5, 0, 0, 0), (0, 2, 0, 0), (0, 0, -1.00002, -0.020002), (0, 0, -1, 0)))
     space, region_3d = viewport(window, Matrix.Identity(4), "PERSP")
-    mirrored = viewport_camera(depsgraph(), space, None, region_3d)
+    mirrored = viewport_camera(depsgraph(), space, region_3d)
     assert (mirrored.clip_start, mirrored.clip_end) == (0.01, 1000.0)
     np.testing.assert_allclose(mirrored.window, (-1 / 1.5, 1 / 1.5, -0.5, 0.5))

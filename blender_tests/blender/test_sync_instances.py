@@ -148,6 +148,50 @@ def test_instanced_light(empty_scene):
     assert len({light.key for light in scene.lights}) == 3
 
 
+def ids_at(scene) -> dict[tuple, int]:
+    """The id of each instance by its place."""
+    return {
+        tuple(np.round(matrix[:3, 3], 3)): int(identifier)
+        for batch in scene.batches
+        for matrix, identifier in zip(batch.matrices, batch.ids, strict=True)
+    }
+
+
+def test_ids_follow_objects_and_instances_when_others_come_and_go(empty_scene):
+    thing = make_object("A first")
+    inside = bpy.data.collections.new("Inside")
+    for x in range(3):
+        placed = bpy.data.objects.new(f"In{x}", thing.data)
+        placed.location.x = x
+        inside.objects.link(placed)
+    for y in range(1, 4):
+        empty = link(f"E{y}", None)
+        empty.instance_type, empty.instance_collection, empty.location.y = "COLLECTION", inside, y
+    for z in range(1, 4):
+        link(f"Z{z}", thing.data).location.z = z
+    before = ids_at(sync().scene)
+    assert len(before) == len(set(before.values())) == 13
+    bpy.data.objects.remove(thing)
+    bpy.data.objects.remove(bpy.data.objects["E1"])
+    (batch,) = sync().scene.batches
+    assert batch.ids.dtype == np.int64
+    after = ids_at(sync().scene)
+    assert len(after) == 3 + 6
+    assert after == {place: before[place] for place in after}
+
+
+def test_ids_of_points_do_not_depend_on_the_frame(empty_scene):
+    def build(nodes, links):
+        return nodes.new("GeometryNodeMeshCube").outputs[0]
+
+    scatter = instance_on_grid(4, build)
+    before = sync().scene.batches[0]
+    scatter.location.z = 5.0
+    (after,) = sync().scene.batches
+    assert len(set(before.ids)) == 16
+    np.testing.assert_array_equal(after.ids, before.ids)
+
+
 def test_slots_linked_to_the_object(empty_scene):
     mine, shared = bpy.data.materials.new("Mine"), bpy.data.materials.new("Shared")
     first = make_object()

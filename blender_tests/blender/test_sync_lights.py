@@ -64,6 +64,15 @@ def test_orientation_is_rigid_and_keeps_the_direction(empty_scene, scale):
     np.testing.assert_allclose(light.world_from_light[:3, 3], (0, 0, HEIGHT))
 
 
+def test_a_portal_does_not_shine(empty_scene):
+    lamp = add_light("AREA")
+    lamp.data.cycles.is_portal = True
+    assert sync().scene.lights == ()
+    lamp.data.cycles.is_portal = False
+    lamp.data.update_tag()
+    assert len(sync().scene.lights) == 1
+
+
 def test_light_without_direction_is_told(empty_scene):
     add_light("SPOT", scale=(1, 1, 0))
     result = sync()

@@ -50,6 +50,19 @@ def test_normals_face_the_viewer_on_either_side_of_mirrored_and_scaled_instances
     np.testing.assert_allclose(layer.normal[16, 16], expected, atol=NORMAL_STEP)
 
 
+@pytest.mark.parametrize("smooth", [True, False])
+def test_a_mirrored_camera_shows_the_mirror_image(render, smooth):
+    slanted = np.tile(np.float64([0.6, 0.0, 0.8] if smooth else [0.0, 0.0, 0.0]), (4, 1))
+    scene = builders.scene(builders.quad("q", center=(0.7, 0.3), normals=slanted), lights=(builders.light(),))
+    camera = builders.camera()
+    left, right, bottom, top = camera.window
+    mirrored = replace(camera, window=(right, left, bottom, top))
+    plain, flipped = (render(scene, view, deep_output=True, channels=tuple(Channel)) for view in (camera, mirrored))
+    assert np.isfinite(plain.layers[0].depth).any()
+    for channel, image in plain.channels.items():
+        np.testing.assert_allclose(flipped.channels[channel], image[:, ::-1], atol=1e-5, err_msg=channel)
+
+
 def test_a_missing_normal_becomes_the_triangles_own(render):
     scene = builders.scene(builders.quad("q", normals=np.zeros((4, 3))))
     layer = render(scene, builders.camera(), deep_output=True).layers[0]

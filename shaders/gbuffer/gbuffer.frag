@@ -46,8 +46,8 @@ bool too_near_previous_layer()
 /** Unit world-space shading normal on the viewer's side of the triangle. */
 vec3 facing_normal()
 {
-    vec3 geometric = cross(dFdx(v_position), dFdy(v_position));
-    bool front = gl_FrontFacing == (v_handedness > 0.0);
+    vec3 geometric = image_handedness * cross(dFdx(v_position), dFdy(v_position));
+    bool front = gl_FrontFacing == (v_handedness * image_handedness > 0.0);
     float squared = dot(v_normal, v_normal);
     if (squared > 0.0)
         return v_normal * (front ? 1.0 : -1.0) * inversesqrt(squared);

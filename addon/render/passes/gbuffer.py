@@ -31,6 +31,7 @@ GBUFFER_UNIFORMS = UniformBlock(
         ("alpha_threshold", "float"),
         ("texture_lod_bias", "float"),
         ("layer", "int"),
+        ("image_handedness", "float"),  # −1 where the window mirrors the picture
         ("orthographic", "int"),
     ),
 )
@@ -186,6 +187,7 @@ class GBufferPass:
             # N accumulated samples resolve √N times finer than one.
             texture_lod_bias=-0.5 * math.log2(max(frame.settings.samples, 1)),
             layer=layer,
+            image_handedness=1.0 if camera.window[1] > camera.window[0] else -1.0,
             orthographic=int(camera.orthographic),
         )
 
