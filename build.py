@@ -5,12 +5,14 @@
 from __future__ import annotations
 
 import argparse
+import importlib
 import re
 import signal
 import sys
 from types import FrameType
 
 MINIMUM_PYTHON = (3, 9)
+TEST_KINDS = ("unit", "gl", "blender", "gui", "stability")
 
 
 def resolution(text: str) -> tuple[int, int]:
@@ -56,9 +58,7 @@ def seconds(text: str) -> float:
 
 
 def command_line() -> argparse.ArgumentParser:
-    """The parser of all verbs; each sets `verb` to its function."""
-    from tooling import checks, packaging, rendering, testing
-
+    """The parser of all verbs; each sets `verb` to the module and name of its function, imported only when it runs."""
     versions = "4.5 or 5.2"
     parser = argparse.ArgumentParser(prog="build.py", description=__doc__)
     verbs = parser.add_subparsers(required=True, metavar="VERB")
@@ -66,7 +66,7 @@ def command_line() -> argparse.ArgumentParser:
     render = verbs.add_parser(
         "render", help="render a .blend", description="Render a .blend with any engine, or a scene snapshot (.npz)."
     )
-    render.set_defaults(verb=rendering.render)
+    render.set_defaults(verb=("tooling.rendering", "render"))
     render.add_argument("file", metavar="FILE.blend")
     render.add_argument(
         "-o", "--output", metavar="OUT", help=".png (view transform) or .exr (all passes); default: beside the .blend"
@@ -89,35 +89,37 @@ def command_line() -> argparse.ArgumentParser:
     )
 
     test = verbs.add_parser("test", help="run the tests", description="Run the tests in every Blender version found.")
-    test.set_defaults(verb=testing.test)
+    test.set_defaults(verb=("tooling.testing", "test"), kinds=TEST_KINDS)
     test.add_argument("--blender", choices=("4.5", "5.2"), help=f"only in {versions}; default: both")
-    test.add_argument("--only", choices=testing.KINDS, action="append", help="only these; may be given again")
+    test.add_argument("--only", choices=TEST_KINDS, action="append", help="only these; may be given again")
     test.add_argument("arguments", nargs="*", metavar="-- ARGUMENTS", help="passed on to pytest")
 
     check = verbs.add_parser("check", help="formatting, lint, types, import contracts, shaders")
-    check.set_defaults(verb=checks.check)
+    check.set_defaults(verb=("tooling.checks", "check"))
 
     package = verbs.add_parser("package", help="build and validate the extension's zips, one per platform")
-    package.set_defaults(verb=packaging.package)
+    package.set_defaults(verb=("tooling.packaging", "package"))
     package.add_argument("-o", "--output", default="dist", metavar="FOLDER", help="default: %(default)s")
 
     bench = verbs.add_parser("bench", help="run the benches and print their tables")
-    bench.set_defaults(verb=testing.bench)
+    bench.set_defaults(verb=("tooling.testing", "bench"))
     bench.add_argument("name", nargs="?", metavar="NAME", help="only this one; default: all")
     return parser
 
 
 def main() -> int:
     """Run the verb on the command line; the exit code."""
-    from tooling.console import INTERRUPTED, ToolError, warn
 
     def terminate(number: int, _frame: FrameType | None) -> None:
         sys.exit(128 + number)
 
     signal.signal(signal.SIGTERM, terminate)
     options = command_line().parse_args()
+    from tooling.console import INTERRUPTED, ToolError, warn
+
     try:
-        return options.verb(options)
+        module, name = options.verb
+        return getattr(importlib.import_module(module), name)(options)
     except ToolError as error:
         warn(f"error: {error}")
         return 1

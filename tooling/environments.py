@@ -5,15 +5,15 @@ from __future__ import annotations
 
 import os
 import platform
-from dataclasses import dataclass
+import re
 from pathlib import Path
+from typing import NamedTuple
 
 from tooling import places, pythons, system_packages
 from tooling.console import ToolError, run_long
 
 
-@dataclass(frozen=True)
-class Blender:
+class Blender(NamedTuple):
     """A Blender release that exists as a Python module; `version` also names its lock file."""
 
     version: str
@@ -56,10 +56,10 @@ def blender_python(version: str | None = None) -> Path:
     """
     wanted = [blender for blender in BLENDERS if version in {None, blender.version}]
     for blender in wanted:
-        interpreter = pythons.find(*blender.python)
-        if interpreter:
+        name = f"blender-{blender.version}"
+        if _is_whole(_place(name, blender.python)) or pythons.find(*blender.python):
             system_packages.provide(system_packages.BLENDER_LIBRARIES)
-            return _provide(f"blender-{blender.version}", interpreter)
+            return _provide(name, blender.python)
     raise ToolError(missing_python(wanted))
 
 
@@ -76,29 +76,47 @@ def runtime_python() -> Path:
 def _any_python(name: str) -> Path:
     """Interpreter of the environment `name`, which works with every Python in MODERN_PYTHONS."""
     for version in MODERN_PYTHONS:
-        interpreter = pythons.find(*version)
-        if interpreter:
-            return _provide(name, interpreter)
+        if _is_whole(_place(name, version)) or pythons.find(*version):
+            return _provide(name, version)
     raise ToolError(
         f"The {name} environment needs Python 3.11 or newer, which was not found here: "
         "`uv python install 3.13` provides one (uv: `pip install uv`)."
     )
 
 
-def _provide(name: str, interpreter: pythons.Interpreter) -> Path:
+def _lock_file(name: str) -> Path:
+    return places.REQUIREMENTS / f"{name}.txt"
+
+
+def _place(name: str, python: tuple[int, int]) -> Path:
+    """The environment's folder, which is there once it has been made: for one lock file and one Python."""
+    identity = places.key(_lock_file(name).read_bytes(), f"{python[0]}.{python[1]}", platform.machine())
+    return places.cache_directory() / "environments" / f"{name}-{identity}"
+
+
+def _is_whole(environment: Path) -> bool:
+    """Whether the environment was made and the Python that it leans on is still where it was; asks no Python."""
+    try:
+        text = (environment / "pyvenv.cfg").read_text(encoding="utf-8")
+    except OSError:
+        return False
+    home = re.search(r"(?m)^home = (.+)$", text)
+    return home is not None and Path(home[1].strip()).is_dir() and executable(environment).exists()
+
+
+def _provide(name: str, python: tuple[int, int]) -> Path:
     """Interpreter of the environment for the lock file `name`.txt. Environments are never changed, only made anew."""
-    lock_file = places.REQUIREMENTS / f"{name}.txt"
-    version = ".".join(str(number) for number in interpreter.version)
-    identity = places.key(lock_file.read_bytes(), version, str(interpreter.path.resolve()), platform.machine())
 
     def make(folder: Path) -> None:
+        interpreter = pythons.find(*python)
+        if interpreter is None:
+            raise ToolError(f"Python {python[0]}.{python[1]} went away while {name} was set up.")
         _create(folder, interpreter)
         command = [executable(folder), "-m", "pip", "install", "--disable-pip-version-check", "--no-input"]
-        command += ["--no-deps", "--only-binary", ":all:", "--require-hashes", "-r", lock_file]
+        command += ["--no-deps", "--only-binary", ":all:", "--require-hashes", "-r", _lock_file(name)]
         run_long(command, f"Setting up the {name} environment (once)")
 
-    place = places.cached(f"environments/{name}-{identity}", lambda folder: executable(folder).exists(), make)
-    return executable(place)
+    return executable(places.cached(f"environments/{_place(name, python).name}", _is_whole, make))
 
 
 def _create(folder: Path, interpreter: pythons.Interpreter) -> None:

@@ -23,6 +23,7 @@ PLATFORMS = {
     "macos-arm64": ("macosx_11_0_arm64",),
 }
 PYTHONS = ("3.11", "3.13", "3.14")  # Blender 4.5, 5.x, and 5.x as distributions build it
+WHEEL_LIST = "wheels.txt"
 
 
 def package(options: Namespace) -> int:
@@ -114,4 +115,15 @@ def wheels(name: str) -> Path:
             pinned = ["--require-hashes", "-r", lock_file]
             run_long([python, "-m", "pip", *common, *tags, *target, *pinned], f"Downloading {name} {abi} wheels")
 
-    return places.cached(f"wheels/{name}-{identity}", lambda _folder: True, download)
+        names = sorted(path.name for path in folder.glob("*.whl"))
+        (folder / WHEEL_LIST).write_text("\n".join(names), encoding="utf-8")
+
+    return places.cached(f"wheels/{name}-{identity}", has_all_wheels, download)
+
+
+def has_all_wheels(folder: Path) -> bool:
+    """Whether every wheel that was downloaded into `folder` is still there."""
+    listed = folder / WHEEL_LIST
+    return listed.is_file() and all(
+        (folder / name).is_file() for name in listed.read_text(encoding="utf-8").splitlines()
+    )

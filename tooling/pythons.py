@@ -7,9 +7,9 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 PROBE_SECONDS = 30
 PROBE = """
@@ -19,8 +19,7 @@ print(*sys.version_info[:3], int(all(map(find_spec, ("ensurepip", "venv")))))
 """
 
 
-@dataclass(frozen=True)
-class Interpreter:
+class Interpreter(NamedTuple):
     """A Python that was run and answered.
 
     `version`: (major, minor, micro). `has_venv`: whether it can make virtual environments with pip; Debian's cannot

@@ -106,6 +106,7 @@ def choose_format(scene: bpy.types.Scene, suffix: str) -> None:
     image.file_format = "OPEN_EXR_MULTILAYER" if multilayer else "PNG"
     if multilayer:
         image.color_depth = "32"
+        image.exr_codec = "ZIP"  # without loss, whatever the file had
 
 
 def show_progress() -> None:

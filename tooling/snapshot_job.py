@@ -10,6 +10,7 @@ import sys
 import time
 from concurrent.futures import Future, wait
 from dataclasses import fields, replace
+from enum import Enum
 from pathlib import Path
 from statistics import median
 from typing import Any, TypeVar
@@ -58,6 +59,10 @@ def parse(kind: type, text: str) -> object:
         if text.lower() not in TRUE | FALSE:
             raise ValueError(f"true or false, not {text!r}")
         return text.lower() in TRUE
+    if issubclass(kind, Enum):
+        if text not in kind.__members__:
+            raise ValueError(f"one of {', '.join(kind.__members__)}, not {text!r}")
+        return kind[text]
     return kind(text)
 
 
@@ -125,10 +130,8 @@ def run(job: dict[str, Any]) -> None:
     if scene.camera is None:
         raise JobError(f"{job['file']}: the scene has no camera.")
     settings = settings_of(job)
-    entries: list[dict[str, Any]] = []
-    for _ in range(job["repeat"]):
-        entries.append(render(scene, scene.camera, settings, job["time_limit"] or 0.0))
-        picture = entries[-1].pop("picture")
+    entries = [render(scene, scene.camera, settings, job["time_limit"] or 0.0) for _ in range(job["repeat"])]
+    picture = [entry.pop("picture") for entry in entries][-1]
     path = Path(job["scratch"]) / "picture.exr"
     write_channels(path, {letter: picture[..., index] for index, letter in enumerate("RGBA")})
     send("picture", {"path": str(path), "frame": 0})

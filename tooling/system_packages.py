@@ -8,14 +8,13 @@ import os
 import shutil
 import sys
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from tooling.console import ToolError, run_long
 
 
-@dataclass(frozen=True)
-class Need:
+class Need(NamedTuple):
     """One thing the system must have.
 
     `libraries`: shared libraries of which one must load. `program`: an executable that must be on PATH.

@@ -3,51 +3,94 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import tempfile
 from argparse import Namespace
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
 from tooling import blender_window, environments, places
 from tooling.console import ToolError, say, warn
 
-KINDS = ("unit", "gl", "blender", "gui", "stability")
-BY_DEFAULT = KINDS
 NO_TESTS = 5
 BENCHES = places.TESTS / "bench"
 # os._exit: Blender 4.5 may wait for ever at exit once it had a GL context of its own.
 PYTEST = """
-import os, sys, pytest
-code = int(pytest.main(sys.argv[1:]))
+import json, os, pathlib, sys, pytest
+
+class Counts:
+    def pytest_terminal_summary(self, terminalreporter):
+        counts = {outcome: len(reports) for outcome, reports in terminalreporter.stats.items()}
+        pathlib.Path(sys.argv[1]).write_text(json.dumps(counts), encoding="utf-8")
+
+code = int(pytest.main(sys.argv[2:], plugins=[Counts()]))
 sys.stdout.flush()
 sys.stderr.flush()
 os._exit(code)
 """
 
 
+@dataclass(frozen=True)
+class Outcome:
+    """What came out of one run of pytest: its exit code and how many tests passed, failed and were skipped."""
+
+    code: int
+    passed: int = 0
+    failed: int = 0
+    skipped: int = 0
+
+
 def test(options: Namespace) -> int:
-    """Run the chosen tests in each Blender version; exit code 1 where any failed or none ran."""
-    kinds = options.only or BY_DEFAULT
-    codes: dict[str, int] = {}
+    """Run the chosen tests in each Blender version; exit code 1 where any failed, could not start, or none ran."""
+    kinds = options.only or options.kinds
+    outcomes: dict[str, Outcome] = {}
     missing: list[str] = []
     inside = [kind for kind in kinds if kind != "gui" and has_tests(places.TESTS / kind)]
     if inside:
         for version in versions(options.blender, missing):
-            python = environments.blender_python(version)
-            codes[f"Blender {version}"] = run_pytest(python, f"Blender {version}", inside, options.arguments)
+            outcomes[f"Blender {version}"] = run_in(version, f"Blender {version}", inside, options.arguments)
     if "gui" in kinds and has_tests(places.TESTS / "gui"):
-        if blender_window.provide():
-            codes["window"] = run_pytest(environments.blender_python(), "window", ["gui"], options.arguments)
+        reason = no_window()
+        if reason:
+            missing.append(f"The window tests did not run: {reason}")
         else:
-            missing.append("The window tests did not run: " + blender_window.why_not())
+            outcomes["window"] = run_in(None, "window", ["gui"], options.arguments)
     for line in missing:
         warn(f"NOT TESTED: {line}")
-    failed = [name for name, code in codes.items() if code not in {0, NO_TESTS}]
+    failed = [name for name, outcome in outcomes.items() if outcome.code not in {0, NO_TESTS}]
     if failed:
         warn(f"test failed in: {', '.join(failed)}")
-    return 1 if failed or all(code == NO_TESTS for code in codes.values()) else 0
+    say(summary(list(outcomes.values())))
+    return 1 if failed or all(outcome.code == NO_TESTS for outcome in outcomes.values()) else 0
+
+
+def summary(outcomes: list[Outcome]) -> str:
+    """One line with the counts of all runs."""
+    passed, failed, skipped = (
+        sum(getattr(outcome, name) for outcome in outcomes) for name in ("passed", "failed", "skipped")
+    )
+    return f"{passed} passed, {failed} failed, {skipped} skipped"
+
+
+def no_window() -> str:
+    """Why there is no window Blender to test in; empty when there is one, made now if need be."""
+    try:
+        return "" if blender_window.provide() else blender_window.why_not()
+    except ToolError as error:
+        return f"making it failed. {error}"
+
+
+def run_in(version: str | None, label: str, kinds: Iterable[str], arguments: list[str]) -> Outcome:
+    """Run the tests in Blender `version` (None: the newest); one that cannot be set up counts as a failure."""
+    try:
+        python = environments.blender_python(version)
+    except ToolError as error:
+        warn(f"error: {error}")
+        return Outcome(1, failed=1)
+    return run_pytest(python, label, kinds, arguments)
 
 
 def has_tests(folder: Path) -> bool:
@@ -70,14 +113,29 @@ def versions(chosen: str | None, missing: list[str]) -> list[str]:
     return [blender.version for blender in here]
 
 
-def run_pytest(python: Path, label: str, kinds: Iterable[str], arguments: list[str]) -> int:
-    """Pytest's exit code for these kinds of tests, on the software rasteriser and with a scratch Blender profile."""
+def run_pytest(python: Path, label: str, kinds: Iterable[str], arguments: list[str]) -> Outcome:
+    """Run these kinds of tests with pytest, on the software rasteriser and with a scratch Blender profile."""
     say(f"== tests: {label} ({', '.join(kinds)})")
     folders = [str(places.TESTS / kind) for kind in kinds]
     with tempfile.TemporaryDirectory(prefix="deep_gbuffer_test_") as scratch:
+        counts = Path(scratch) / "counts.json"
         surroundings = {**os.environ, "LIBGL_ALWAYS_SOFTWARE": "1", "BLENDER_USER_RESOURCES": scratch}
-        command = [str(python), "-P", "-c", PYTEST, *folders, *arguments]
-        return subprocess.run(command, cwd=places.REPOSITORY, env=surroundings, check=False).returncode
+        command = [str(python), "-P", "-c", PYTEST, str(counts), *folders, *arguments]
+        code = subprocess.run(command, cwd=places.REPOSITORY, env=surroundings, check=False).returncode
+        return outcome_of(code, json.loads(counts.read_text(encoding="utf-8")) if counts.is_file() else {})
+
+
+def outcome_of(code: int, counts: dict[str, int]) -> Outcome:
+    """The outcome for pytest's exit code and counts by its names; a run that failed without a failed test counts one.
+
+    Errors count as failed, unexpected passes as passed, expected failures as skipped.
+    """
+    passed, failed, skipped = (
+        counts.get(first, 0) + counts.get(second, 0)
+        for first, second in (("passed", "xpassed"), ("failed", "error"), ("skipped", "xfailed"))
+    )
+    is_bad = code not in {0, NO_TESTS}
+    return Outcome(code, passed, max(failed, 1) if is_bad else failed, skipped)
 
 
 def bench(options: Namespace) -> int:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From nothing to a picture: Cornell at 640×360 with 16 samples, process start included, against EEVEE."""
 
+import os
+import platform
 import statistics
 import sys
 import tempfile
@@ -15,8 +17,19 @@ ROUNDS = 3
 TARGET = 5.0
 
 
+def machine() -> str:
+    """The processor's model, the cores this process may use, and the operating system."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    model = platform.processor()
+    described = Path("/proc/cpuinfo")
+    if described.is_file():
+        lines = (line.partition(":") for line in described.read_text(encoding="utf-8").splitlines())
+        model = next((value.strip() for key, _, value in lines if key.strip() == "model name"), model)
+    return f"{model or platform.machine()}, {cores} cores, {platform.system()}"
+
+
 def main(arguments: list[str]) -> int:
-    """Run the bench; exit code 1 where EEVEE takes less than TARGET times as long from an empty shader cache."""
+    """Run the bench; exit code 1 where EEVEE takes less than TARGET times as long in any state of the shader cache."""
     if arguments:
         print("first_frame takes no arguments")
         return 2
@@ -35,10 +48,10 @@ def main(arguments: list[str]) -> int:
     text = table(["driver's shader cache", "Deep G-Buffer", "EEVEE", "ratio"], rows)
     text += (
         f"\nWall time of `build.py render`, process start included: {RESOLUTION}, {SAMPLES} samples, "
-        f"median of {ROUNDS} alternating runs; target: {TARGET:.0f}× or more from an empty cache.\n"
+        f"median of {ROUNDS} alternating runs; target: {TARGET:.0f}× or more in every row. Machine: {machine()}.\n"
     )
     report("first_frame", "First frame", text)
-    return 0 if ratios[STATES.index("empty")] >= TARGET else 1
+    return 0 if min(ratios) >= TARGET else 1
 
 
 if __name__ == "__main__":

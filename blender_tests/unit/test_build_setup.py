@@ -83,6 +83,32 @@ def test_a_cached_folder_that_stopped_working_is_made_again(tmp_path, monkeypatc
     assert (again / "interpreter").exists()
 
 
+def test_a_wheel_that_went_away_is_noticed(tmp_path):
+    names = ["a-1-cp311-cp311-any.whl", "a-1-cp313-cp313-any.whl"]
+    assert not packaging.has_all_wheels(tmp_path)
+    (tmp_path / packaging.WHEEL_LIST).write_text("\n".join(names), encoding="utf-8")
+    for name in names:
+        (tmp_path / name).touch()
+    assert packaging.has_all_wheels(tmp_path)
+    (tmp_path / names[0]).unlink()
+    assert not packaging.has_all_wheels(tmp_path)
+
+
+def test_an_environment_is_used_without_asking_a_python_and_made_again_without_its_home(tmp_path, monkeypatch):
+    monkeypatch.setenv("DEEP_GBUFFER_CACHE", str(tmp_path))
+    monkeypatch.setattr(environments.system_packages, "provide", lambda _needs: None)
+    monkeypatch.setattr(pythons, "probe", lambda path: pytest.fail(f"{path} was asked"))
+    newest = environments.BLENDERS[0]
+    environment = environments._place(f"blender-{newest.version}", newest.python)
+    executable_file(environments.executable(environment), "")
+    (environment / "pyvenv.cfg").write_text(f"home = {tmp_path}\nversion = 3.13.0\n", encoding="utf-8")
+    assert environments.blender_python() == environments.executable(environment)
+    (environment / "pyvenv.cfg").write_text(f"home = {tmp_path / 'gone'}\n", encoding="utf-8")
+    monkeypatch.setattr(pythons, "find", lambda *_version: None)
+    with pytest.raises(ToolError, match=newest.python_text):
+        environments.blender_python(newest.version)
+
+
 def test_keys_tell_the_parts_apart():
     assert places.key("ab", "c") != places.key("a", "bc")
     assert places.key("ab", "c") == places.key("ab", "c")
