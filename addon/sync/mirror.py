@@ -15,7 +15,7 @@ from .effects import effect_messages
 from .instances import Placements, build_batch, read_matrices, shown_instances
 from .keys import MeshKeys, batch_key, id_key, instance_id, instance_key
 from .lights import read_light
-from .materials import MaterialTable
+from .materials import MaterialTable, missing_attribute_messages
 from .meshes import MeshRecord, update_mesh
 from .visibility import Hidden, Visibility
 from .world import read_world
@@ -86,6 +86,7 @@ class Mirror:
             world=world,
             camera=render_camera(depsgraph, max(width, 1), max(height, 1)),
         )
+        missing_attribute_messages(scene, messages)
         if space is None:
             effect_messages(depsgraph, scene, messages)
         self._scene = with_versions(scene, self._scene)

@@ -129,6 +129,45 @@ def test_texture_node_without_image(empty_scene):
     assert_texts(texts, "“Painted”", "“Image Texture”", "no image")
 
 
+def test_only_the_first_udim_tile_is_read_and_told(empty_scene, tmp_path):
+    for number, color in ((1001, (1.0, 0.0, 0.0, 1.0)), (1002, (0.0, 1.0, 0.0, 1.0))):
+        tile = make_image(f"Tile {number}", color)
+        tile.filepath_raw, tile.file_format = str(tmp_path / f"wall.{number}.png"), "PNG"
+        tile.save()
+    image = bpy.data.images.load(str(tmp_path / "wall.1001.png"))
+    image.source = "TILED"
+    material = textured(image)[0]
+    _, scene, texts = mirrored_material(material)
+    (mirrored,) = scene.images.values()
+    np.testing.assert_array_equal(mirrored.pixels, np.full((2, 3, 4), (255, 0, 0, 255)))
+    assert_texts(texts, f"“{image.name}”", "2 UDIM tiles", "only the first")
+
+
+def test_added_udim_tile_is_told(empty_scene):
+    image = bpy.data.images.new("Wall", 2, 2, tiled=True)
+    make_object().data.materials.append(textured(image)[0])
+    mirror = Mirror()
+    assert not any("UDIM" in text for text in sync(mirror).warnings)
+    image.tiles.new(tile_number=1002)
+    assert_texts(sync(mirror).warnings, "“Wall”", "2 UDIM tiles")
+
+
+@pytest.mark.parametrize("modes", [("STRAIGHT", "CHANNEL_PACKED"), ("CHANNEL_PACKED", "STRAIGHT")])
+def test_alpha_mode_changed_later_is_like_from_the_start(empty_scene, modes):
+    """The pixels as Blender stores them stay equal, but what is shown does not."""
+    image = make_image(color=(0.5, 0.5, 0.5, 0.5))
+    image.pack()
+    make_object().data.materials.append(textured(image)[0])
+    mirror, shown = Mirror(), []
+    for mode in modes:
+        image.alpha_mode = mode
+        (kept,) = sync(mirror).scene.images.values()
+        (fresh,) = sync().scene.images.values()
+        np.testing.assert_array_equal(kept.pixels, fresh.pixels)
+        shown.append(int(kept.pixels[0, 0, 0]))
+    assert shown == [64 if mode == "STRAIGHT" else 128 for mode in modes]
+
+
 def test_painting_on_an_image_is_seen(empty_scene):
     image = make_image(color=(0.2, 0.4, 0.6, 1.0))
     make_object().data.materials.append(textured(image)[0])

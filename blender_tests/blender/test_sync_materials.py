@@ -20,6 +20,8 @@ from sync_scenes import (
 
 from addon.scene import BaseColorSource, Material
 from addon.sync import Mirror
+from addon.sync.changes import Messages
+from addon.sync.materials import missing_attribute_messages
 
 F0_15 = 0.04
 
@@ -29,8 +31,8 @@ F0_15 = 0.04
     [
         (
             "ShaderNodeBsdfPrincipled",
-            {"Base_Color": (0.1, 0.2, 0.3, 1), "Metallic": 0.4, "Roughness": 0.7, "IOR": 1.5, "Alpha": 0.6},
-            {"base_color": (0.1, 0.2, 0.3), "metallic": 0.4, "roughness": 0.7, "specular": F0_15, "alpha": 0.6},
+            {"Base_Color": (0.1, 0.2, 0.3, 1), "Metallic": 0.4, "Roughness": 0.7, "IOR": 1.5, "Alpha": 0.0},
+            {"base_color": (0.1, 0.2, 0.3), "metallic": 0.4, "roughness": 0.7, "specular": F0_15, "alpha": 0.0},
         ),
         ("ShaderNodeBsdfPrincipled", {"IOR": 1.5, "Specular_IOR_Level": 0.25}, {"specular": F0_15 / 2}),
         (
@@ -251,6 +253,39 @@ def test_material_without_nodes(empty_scene):
     mirrored, _, texts = mirrored_material(material)
     assert mirrored.base_color == pytest.approx((0.1, 0.2, 0.3))
     assert_texts(texts, "“Plain”", "no nodes")
+
+
+@pytest.mark.parametrize(("alpha", "words"), [(0.75, "drawn opaque"), (0.25, "left out")])
+def test_blended_transparency_is_told(empty_scene, alpha, words):
+    mirrored, _, texts = mirrored_material(make_material("Film", "ShaderNodeBsdfPrincipled", Alpha=alpha)[0])
+    assert mirrored.alpha == alpha
+    assert_texts(texts, "“Film”", "“Principled BSDF”", "blended transparency is not rendered yet", words)
+
+
+def test_blended_transparency_of_a_mix_is_told(empty_scene):
+    material, first = make_material("Film", "ShaderNodeBsdfDiffuse")
+    mix = add(material, "ShaderNodeMixShader")
+    mix.inputs[0].default_value = 0.25
+    connect(material, first.outputs[0], mix.inputs[1])
+    connect(material, add(material, "ShaderNodeBsdfTransparent").outputs[0], mix.inputs[2])
+    connect(material, mix.outputs[0], material.node_tree.nodes["Material Output"].inputs[0])
+    assert_texts(mirrored_material(material)[2], "“Film”", "“Mix Shader”", "blended transparency", "drawn opaque")
+
+
+def test_mesh_without_uv_map_is_told(empty_scene):
+    make_object("Bare").data.materials.append(textured(make_image())[0])
+    messages = Messages()
+    missing_attribute_messages(sync().scene, messages)
+    assert_texts(messages.texts(), "“Painted”", "no UV map", "“Bare”")
+
+
+def test_mesh_without_colour_attribute_is_told(empty_scene):
+    material, shader = make_material("Vertex", "ShaderNodeBsdfPrincipled")
+    connect(material, add(material, "ShaderNodeVertexColor").outputs["Color"], shader.inputs["Base Color"])
+    make_object("Bare").data.materials.append(material)
+    messages = Messages()
+    missing_attribute_messages(sync().scene, messages)
+    assert_texts(messages.texts(), "“Vertex”", "no colour attribute", "“Bare”")
 
 
 def test_output_without_surface_is_black_and_told(empty_scene):

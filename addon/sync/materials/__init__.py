@@ -6,19 +6,22 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from ...scene import BaseColorSource, Extension, Image, ImageTexture, Interpolation, Material
+from ...scene import BaseColorSource, Extension, Image, ImageTexture, Interpolation, Material, RenderSettings
 from ...scene.arrays import Color
 from ..changes import Messages, new_version
 from ..keys import DEFAULT_MATERIAL, id_key
-from .expressions import Evaluator, Expression, luminance
-from .graph import find_output, find_source, has_nodes
+from .expressions import Evaluator, Expression
+from .graph import Node, find_output, find_source, has_nodes
 from .images import ImageTable
+from .missing import missing_attribute_messages
+from .nodes import NODE_READERS
+from .operations import as_value, unit
 from .surfaces import BLACK, Surface, evaluate_surface
 
 if TYPE_CHECKING:
     import bpy
 
-__all__ = ["ImageTable", "MaterialTable", "evaluate_emission", "has_nodes"]
+__all__ = ["ImageTable", "MaterialTable", "evaluate_emission", "has_nodes", "missing_attribute_messages"]
 
 
 @dataclass(frozen=True)
@@ -75,12 +78,13 @@ class MaterialTable:
         tree: Any = material.node_tree
         if not has_nodes(material):
             return _without_nodes(key, material)
-        evaluator = Evaluator(owner, self.images)
+        evaluator = Evaluator(owner, self.images, NODE_READERS)
         output = find_output(tree, "ShaderNodeOutputMaterial")
         if output is None or find_source(output.inputs["Surface"], ()).node is None:
             text = f"{owner} has no surface shader connected to its output; it is shown black."
             return MaterialRecord(_material(key, material, Surface()), None, (text,))
         surface = evaluate_surface(output.inputs["Surface"], (), evaluator)
+        _warn_blended(surface, find_source(output.inputs["Surface"], ()).node, evaluator)
         for name in ("Volume", "Displacement"):
             if find_source(output.inputs[name], ()).node is not None:
                 evaluator.warn(output, f"{name.lower()} is not rendered yet")
@@ -89,10 +93,6 @@ class MaterialTable:
     def _with_texture(self, material: Material, surface: Surface, evaluator: Evaluator) -> MaterialRecord:
         """`material` with what its base colour and alpha read."""
         base, alpha = surface.base_color, surface.alpha
-        if base.texture is not None and base.component != "RGB":
-            evaluator.warn(
-                base.texture, "one channel of an image as base colour is not rendered yet; all three are used"
-            )
         if base.texture is None and alpha.texture is None:
             source = BaseColorSource.CONSTANT if base.attribute is None else BaseColorSource.ATTRIBUTE
             return MaterialRecord(replace(material, source=source), base.attribute or None, tuple(evaluator.warnings))
@@ -108,6 +108,8 @@ class MaterialTable:
     ) -> MaterialRecord:
         owner = evaluator.owner
         color = None if base.texture is None else self.images.mirror(base.texture, owner).image
+        if color is not None and base.component != "RGB":
+            color = self.images.as_grey(color, base.component)
         image = color
         if alpha.texture is not None:
             mask = self.images.mirror(alpha.texture, owner).image
@@ -134,11 +136,19 @@ def evaluate_emission(owner: str, tree: Any, output_type: str, images: ImageTabl
     output = find_output(tree, output_type)
     if output is None:
         return BLACK, ()
-    evaluator = Evaluator(owner, images)
+    evaluator = Evaluator(owner, images, NODE_READERS)
     surface = evaluate_surface(output.inputs["Surface"], (), evaluator)
     if "Volume" in output.inputs and find_source(output.inputs["Volume"], ()).node is not None:
         evaluator.warn(output, "volume is not rendered yet")
     return surface.emission, tuple(evaluator.warnings)
+
+
+def _warn_blended(surface: Surface, node: Node, evaluator: Evaluator) -> None:
+    alpha = unit(as_value(surface.alpha.factor))
+    if round(alpha, 3) in {0.0, 1.0}:
+        return
+    shown = "left out" if alpha < RenderSettings.alpha_threshold else "drawn opaque"
+    evaluator.warn(node, f"blended transparency is not rendered yet; with an alpha of {alpha:.2g} it is {shown}")
 
 
 def _default() -> MaterialRecord:
@@ -166,7 +176,7 @@ def _material(key: str, material: bpy.types.Material, surface: Surface) -> Mater
         name=material.name,
         version=new_version(),
         base_color=surface.base_color.factor,
-        alpha=min(max(luminance(surface.alpha.factor), 0.0), 1.0),
+        alpha=unit(as_value(surface.alpha.factor)),
         metallic=surface.metallic,
         roughness=surface.roughness,
         specular=surface.specular,

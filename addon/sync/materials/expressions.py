@@ -3,27 +3,29 @@
 
 from __future__ import annotations
 
-import colorsys
-import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
+
+import numpy as np
 
 from ...scene.arrays import Color
 from .graph import Groups, Node, Socket, Source, find_source
 from .images import ImageTable
+from .operations import as_value, limited, luminance, multiply, per_channel, uniform, unit
 
-LUMINANCE = (0.2126, 0.7152, 0.0722)
-WHITE: Color = (1.0, 1.0, 1.0)
 _GREY = 0.5
+_DEEPEST = 80
+"""Nodes on one path, well within Python's own limit of nested calls."""
+_Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True)
 class Expression:
     """`factor` (linear RGB; equal components for a plain value), multiplied by what is read, if anything.
 
-    `texture`: an image texture node, of which `component` is read: RGB, ALPHA, RED, GREEN, BLUE or INVERTED_ALPHA.
-    `attribute`: name of a colour attribute, empty for the mesh's own choice.
+    `texture`: an image texture node, of which `component` is read: RGB, LUMINANCE, RED, GREEN, BLUE, ALPHA or
+    INVERTED_ALPHA. `attribute`: name of a colour attribute, empty for the mesh's own choice.
     """
 
     factor: Color
@@ -42,62 +44,62 @@ class Expression:
 
     def scaled(self, value: float) -> Expression:
         """This expression times a number."""
-        return self.times(_uniform(value))
+        return self.times(uniform(value))
+
+
+Reader = Callable[[Source, "Evaluator"], Expression]
 
 
 def grey(value: float) -> Expression:
     """A constant value."""
-    return Expression((value, value, value))
-
-
-def luminance(color: Color) -> float:
-    """What Blender makes of a colour that is plugged into a value."""
-    return sum(weight * channel for weight, channel in zip(LUMINANCE, color, strict=True))
+    return Expression(uniform(value))
 
 
 class Evaluator:
-    """Evaluates the sockets of one node graph; `owner` (“Material “X””) begins each text it adds to `warnings`."""
+    """Evaluates the sockets of one node graph; `owner` (“Material “X””) begins each text it adds to `warnings`.
 
-    def __init__(self, owner: str, images: ImageTable) -> None:
+    `readers` are what each type of node (`bl_idname`) computes. Every output is read once, however many inputs
+    share it. No Blender object is kept longer than the evaluator.
+    """
+
+    def __init__(self, owner: str, images: ImageTable, readers: Mapping[str, Reader]) -> None:
         self.owner = owner
         self.images = images
         self.warnings: dict[str, None] = {}
-        self._handlers: dict[str, Callable[[Source], Expression]] = {
-            "ShaderNodeRGB": self._color_output,
-            "ShaderNodeValue": lambda source: grey(source.socket.default_value),
-            "ShaderNodeTexImage": self._image_texture,
-            "ShaderNodeTexEnvironment": self._environment,
-            "ShaderNodeVertexColor": lambda source: self._attribute(source, source.node.layer_name),
-            "ShaderNodeAttribute": self._geometry_attribute,
-            "ShaderNodeMix": self._mix,
-            "ShaderNodeMixRGB": self._mix_legacy,
-            "ShaderNodeMath": self._math,
-            "ShaderNodeGamma": self._gamma,
-            "ShaderNodeInvert": self._invert,
-            "ShaderNodeHueSaturation": self._hue_saturation,
-            "ShaderNodeBrightContrast": self._bright_contrast,
-            "ShaderNodeValToRGB": self._color_ramp,
-            "ShaderNodeRGBToBW": self._to_value,
-            "ShaderNodeSeparateColor": self._separate,
-            "ShaderNodeCombineColor": self._combine,
-            "ShaderNodeLightPath": self._light_path,
-            "ShaderNodeFresnel": self._fresnel,
-            "ShaderNodeLayerWeight": self._fresnel,
-        }
+        self._readers = readers
+        self._results: dict[object, Any] = {}
+        self._depth = 0
 
     def warn(self, node: Node, text: str) -> None:
         """Report once what `node` asks for and what is shown instead; `text` is a clause."""
         self.warnings.setdefault(f"{self.owner}, node “{node.name}”: {text}.", None)
 
+    def once(self, source: Source, read: Callable[[Source, Evaluator], _Result], too_deep: _Result) -> _Result:
+        """What `read` makes of a node's output, remembered; `too_deep`, told, at the end of a very long path."""
+        if source.key in self._results:
+            return self._results[source.key]
+        if self._depth == _DEEPEST:
+            self.warn(source.node, f"more than {_DEEPEST} nodes follow one another; what comes before is left out")
+            return too_deep
+        self._depth += 1
+        try:
+            result = read(source, self)
+        finally:
+            self._depth -= 1
+        self._results[source.key] = result
+        return result
+
     def expression(self, socket: Socket, groups: Groups) -> Expression:
-        """What an input receives."""
+        """What an input receives, converted to a value (see `to_value`) where the input is one."""
         source = find_source(socket, groups)
         if source.node is None:
-            return _socket_value(source.socket)
-        if source.node.mute:
+            value = _socket_value(source.socket)
+            expression = replace(value, factor=self.limited(value.factor, source.socket.node))
+        elif source.node.mute:
             return grey(0.0)
-        handler = self._handlers.get(source.node.bl_idname)
-        return self._unknown(source) if handler is None else handler(source)
+        else:
+            expression = self.once(source, Evaluator._read, grey(_GREY))
+        return self.to_value(expression, socket.node, socket.name) if socket.type == "VALUE" else expression
 
     def color(self, socket: Socket, groups: Groups) -> Color:
         """What an input receives as one colour; a texture is replaced by its mean, and the user is told."""
@@ -105,8 +107,7 @@ class Evaluator:
 
     def value(self, socket: Socket, groups: Groups) -> float:
         """What an input receives as one number; a texture is replaced by its mean, and the user is told."""
-        color = self.color(socket, groups)
-        return color[0] if color[0] == color[1] == color[2] else luminance(color)
+        return as_value(self.color(socket, groups))
 
     def reduce(self, expression: Expression, node: Node, what: str) -> Color:
         """`expression` without its texture or attribute, which the user is told `node` cannot have for `what`."""
@@ -118,14 +119,40 @@ class Evaluator:
         self.warn(node, f"a texture for {what} is not rendered yet; the image's mean is used instead")
         return multiply(expression.factor, self._mean(expression))
 
-    def _mean(self, expression: Expression) -> Color:
-        red, green, blue, alpha = self.images.mirror(expression.texture, self.owner).mean
-        by_component = {"RED": red, "GREEN": green, "BLUE": blue, "ALPHA": alpha, "INVERTED_ALPHA": 1.0 - alpha}
-        if expression.component == "RGB":
-            return red, green, blue
-        return _uniform(by_component[expression.component])
+    def to_value(self, expression: Expression, node: Node, what: str) -> Expression:
+        """`expression` as grey: the luminance of a colour, a texture's too where its factor has no hue.
 
-    def _unknown(self, source: Source) -> Expression:
+        Otherwise it is reduced to a constant for `what`, which the user is told.
+        """
+        value = as_value(expression.factor)
+        has_hue = expression.factor != uniform(value)
+        if expression.attribute is not None or (expression.texture is not None and expression.component == "RGB"):
+            if expression.attribute is not None or has_hue:
+                return grey(as_value(self.reduce(expression, node, what)))
+            return replace(expression, component="LUMINANCE")
+        return replace(expression, factor=uniform(value)) if has_hue else expression
+
+    def clamped(self, expression: Expression, node: Node) -> Expression:
+        """`expression` within 0…1; a texture that may leave it is reduced to a constant, which the user is told."""
+        if expression.attribute is not None:
+            self.warn(node, "clamping a colour attribute is not rendered yet; the attribute is used as it is")
+            return expression
+        if expression.texture is not None:
+            pixels = self.images.mirror(expression.texture, self.owner).image.pixels
+            if pixels.dtype == np.uint8 and all(0.0 <= factor <= 1.0 for factor in expression.factor):
+                return expression
+        return Expression(per_channel(unit, self.reduce(expression, node, "a clamped result")))
+
+    def limited(self, color: Color, node: Node) -> Color:
+        """`color` within what a picture can hold; the user is told where `node` exceeds it."""
+        result = per_channel(limited, color)
+        if result != color:
+            shown = ", ".join(f"{channel:g}" for channel in dict.fromkeys(result))
+            self.warn(node, f"its value is too large or not a number; {shown} is used instead")
+        return result
+
+    def unknown(self, source: Source) -> Expression:
+        """What is shown for a node that cannot be computed: its colour input, or grey; the user is told."""
         colors = [entry for entry in source.node.inputs if entry.type == "RGBA" and entry.enabled]
         if colors:
             self.warn(source.node, f"{source.node.bl_label} is not rendered yet; its colour input is used as it is")
@@ -133,176 +160,25 @@ class Evaluator:
         self.warn(source.node, f"{source.node.bl_label} is not rendered yet; grey {_GREY} is used instead")
         return grey(_GREY)
 
-    def _color_output(self, source: Source) -> Expression:
-        return Expression(tuple(source.socket.default_value[:3]))
+    @staticmethod
+    def _read(source: Source, evaluator: Evaluator) -> Expression:
+        reader = evaluator._readers.get(source.node.bl_idname)
+        expression = evaluator.unknown(source) if reader is None else reader(source, evaluator)
+        return replace(expression, factor=evaluator.limited(expression.factor, source.node))
 
-    def _image_texture(self, source: Source) -> Expression:
-        self._check_projection(source.node, source.groups)
-        return Expression(WHITE, source.node, "ALPHA" if source.socket.identifier == "Alpha" else "RGB")
-
-    def _environment(self, source: Source) -> Expression:
-        self.warn(source.node, "environment images are not rendered yet; the image's mean is used instead")
-        return Expression(self.images.mirror(source.node, self.owner).mean[:3])
-
-    def _check_projection(self, node: Node, groups: Groups) -> None:
-        vector = find_source(node.inputs["Vector"], groups)
-        kind = "" if vector.node is None else vector.node.bl_idname
-        by_uv = kind in {"", "ShaderNodeUVMap"} or (kind == "ShaderNodeTexCoord" and vector.socket.identifier == "UV")
-        if not by_uv or node.projection != "FLAT":
-            self.warn(node, "only the plain UV map is rendered yet; other coordinates and projections are ignored")
-
-    def _attribute(self, source: Source, name: str) -> Expression:
-        if source.socket.identifier == "Alpha":
-            self.warn(source.node, "an attribute's alpha is not rendered yet; 1 is used instead")
-            return grey(1.0)
-        return Expression(WHITE, attribute=name)
-
-    def _geometry_attribute(self, source: Source) -> Expression:
-        if source.node.attribute_type != "GEOMETRY":
-            return self._unknown(source)
-        return self._attribute(source, source.node.attribute_name)
-
-    def _mix(self, source: Source) -> Expression:
-        node = source.node
-        suffix = {"RGBA": "Color", "FLOAT": "Float", "VECTOR": "Vector"}.get(node.data_type)
-        if suffix is None:
-            return self._unknown(source)
-        by_identifier = {entry.identifier: entry for entry in node.inputs}
-        blend = node.blend_type if node.data_type == "RGBA" else "MIX"
-        inputs = (by_identifier["Factor_Float"], by_identifier[f"A_{suffix}"], by_identifier[f"B_{suffix}"])
-        return self._blend(source, blend, inputs, node.clamp_factor)
-
-    def _mix_legacy(self, source: Source) -> Expression:
-        return self._blend(source, source.node.blend_type, tuple(source.node.inputs[:3]), True)
-
-    def _blend(self, source: Source, blend: str, inputs: tuple[Socket, ...], clamp_factor: bool) -> Expression:
-        fraction = self.value(inputs[0], source.groups)
-        if clamp_factor:
-            fraction = min(max(fraction, 0.0), 1.0)
-        if fraction == 0.0:
-            return self.expression(inputs[1], source.groups)
-        if fraction == 1.0 and blend == "MIX":
-            return self.expression(inputs[2], source.groups)
-        first, second = (self.expression(entry, source.groups) for entry in inputs[1:])
-        if first.is_constant and second.is_constant:
-            operation = _BLENDS.get(blend)
-            if operation is None:
-                self.warn(source.node, f"blend mode {blend.title()} is not rendered yet; plain mixing is used instead")
-                operation = _BLENDS["MIX"]
-            blended = per_channel(operation, first.factor, second.factor)
-            return Expression(_lerp(first.factor, blended, fraction))
-        if blend == "MULTIPLY" and second.is_constant:
-            return first.times(_lerp(WHITE, second.factor, fraction))
-        if blend == "MULTIPLY" and first.is_constant and fraction == 1.0:
-            return second.times(first.factor)
-        kept = first if not first.is_constant and (blend != "MIX" or fraction < 0.5 or second.is_constant) else second
-        if blend == "MULTIPLY" and second.texture is not None and first.attribute is not None:
-            kept = second
-        self.warn(source.node, "this combination of colours is not rendered yet; only one of them is used")
-        return kept
-
-    def _math(self, source: Source) -> Expression:
-        node = source.node
-        if node.operation == "MULTIPLY":
-            first, second = (self.expression(entry, source.groups) for entry in node.inputs[:2])
-            if first.is_constant or second.is_constant:
-                constant, other = (first, second) if first.is_constant else (second, first)
-                return other.scaled(luminance(constant.factor))
-        if node.operation == "SUBTRACT":
-            first, second = (self.expression(entry, source.groups) for entry in node.inputs[:2])
-            if first == grey(1.0) and second == Expression(WHITE, second.texture, "ALPHA"):
-                return replace(second, component="INVERTED_ALPHA")
-        operation = _MATH.get(node.operation)
-        if operation is None:
-            self.warn(node, f"operation {node.operation.title()} is not rendered yet; its first input is used as it is")
-            return self.expression(node.inputs[0], source.groups)
-        arguments = [self.value(entry, source.groups) for entry in node.inputs if entry.enabled]
-        result = operation(*arguments)
-        return grey(min(max(result, 0.0), 1.0) if node.use_clamp else result)
-
-    def _adjust(self, source: Source, adjust: Callable[[Color], Color], *, neutral: bool) -> Expression:
-        """The node's colour input after `adjust`; a texture is kept as it is, with a warning unless `neutral`."""
-        expression = self.expression(source.node.inputs["Color"], source.groups)
-        if neutral:
-            return expression
-        if expression.is_constant:
-            return Expression(adjust(expression.factor))
-        self.warn(source.node, f"{source.node.bl_label} of a texture is not rendered yet; the texture is used as it is")
-        return expression
-
-    def _gamma(self, source: Source) -> Expression:
-        gamma = self.value(source.node.inputs["Gamma"], source.groups)
-        return self._adjust(
-            source, lambda color: per_channel(lambda c: c**gamma if c > 0.0 else c, color), neutral=gamma == 1.0
-        )
-
-    def _invert(self, source: Source) -> Expression:
-        fraction = self.value(source.node.inputs[0], source.groups)
-        return self._adjust(
-            source, lambda color: _lerp(color, per_channel(lambda c: 1.0 - c, color), fraction), neutral=fraction == 0.0
-        )
-
-    def _hue_saturation(self, source: Source) -> Expression:
-        hue, saturation, value, fraction = (
-            self.value(source.node.inputs[name], source.groups) for name in ("Hue", "Saturation", "Value", "Fac")
-        )
-
-        def adjust(color: Color) -> Color:
-            old_hue, old_saturation, old_value = colorsys.rgb_to_hsv(*color)
-            new_saturation = min(max(old_saturation * saturation, 0.0), 1.0)
-            shifted = colorsys.hsv_to_rgb((old_hue + hue + 0.5) % 1.0, new_saturation, old_value * value)
-            return _lerp(color, per_channel(lambda c: max(c, 0.0), shifted), fraction)
-
-        return self._adjust(source, adjust, neutral=fraction == 0.0 or (hue, saturation, value) == (0.5, 1.0, 1.0))
-
-    def _bright_contrast(self, source: Source) -> Expression:
-        bright, contrast = (self.value(source.node.inputs[name], source.groups) for name in ("Bright", "Contrast"))
-        scale, offset = 1.0 + contrast, bright - contrast * 0.5
-        return self._adjust(
-            source,
-            lambda color: per_channel(lambda c: max(c * scale + offset, 0.0), color),
-            neutral=bright == contrast == 0.0,
-        )
-
-    def _color_ramp(self, source: Source) -> Expression:
-        result = source.node.color_ramp.evaluate(self.value(source.node.inputs[0], source.groups))
-        return grey(result[3]) if source.socket.identifier == "Alpha" else Expression(tuple(result[:3]))
-
-    def _to_value(self, source: Source) -> Expression:
-        expression = self.expression(source.node.inputs[0], source.groups)
-        return grey(luminance(expression.factor)) if expression.is_constant else expression
-
-    def _separate(self, source: Source) -> Expression:
-        if source.node.mode != "RGB":
-            return self._unknown(source)
-        expression = self.expression(source.node.inputs[0], source.groups)
-        index = ("Red", "Green", "Blue").index(source.socket.identifier)
-        component = source.socket.identifier.upper() if expression.component == "RGB" else expression.component
-        return replace(expression, factor=_uniform(expression.factor[index]), component=component)
-
-    def _combine(self, source: Source) -> Expression:
-        if source.node.mode != "RGB":
-            return self._unknown(source)
-        red, green, blue = (self.value(entry, source.groups) for entry in source.node.inputs[:3])
-        return Expression((red, green, blue))
-
-    def _light_path(self, source: Source) -> Expression:
-        self.warn(source.node, "rays of different kinds are not told apart yet; all are treated as camera rays")
-        return grey(1.0 if source.socket.name == "Is Camera Ray" else 0.0)
-
-    def _fresnel(self, source: Source) -> Expression:
-        self.warn(source.node, f"{source.node.bl_label} is not rendered yet; its value for facing surfaces is used")
-        if source.socket.identifier == "Facing":
-            return grey(0.0)
-        if source.node.bl_idname == "ShaderNodeFresnel":
-            return grey(reflectance(self.value(source.node.inputs["IOR"], source.groups)))
-        blend = self.value(source.node.inputs["Blend"], source.groups)
-        return grey(reflectance(1.0 / max(1.0 - blend, 1e-5)))
-
-
-def reflectance(index_of_refraction: float) -> float:
-    """Reflectance of a dielectric at normal incidence (F0)."""
-    return ((index_of_refraction - 1.0) / (index_of_refraction + 1.0)) ** 2
+    def _mean(self, expression: Expression) -> Color:
+        red, green, blue, alpha = self.images.mirror(expression.texture, self.owner).mean
+        if expression.component == "RGB":
+            return red, green, blue
+        by_component = {
+            "LUMINANCE": luminance((red, green, blue)),
+            "RED": red,
+            "GREEN": green,
+            "BLUE": blue,
+            "ALPHA": alpha,
+            "INVERTED_ALPHA": 1.0 - alpha,
+        }
+        return uniform(by_component[expression.component])
 
 
 def _socket_value(socket: Socket) -> Expression:
@@ -310,51 +186,3 @@ def _socket_value(socket: Socket) -> Expression:
     if isinstance(value, bool | int | float):
         return grey(float(value))
     return Expression(tuple(value[:3]))
-
-
-def multiply(first: Color, second: Color) -> Color:
-    """Product of two colours, channel by channel."""
-    return first[0] * second[0], first[1] * second[1], first[2] * second[2]
-
-
-def _lerp(first: Color, second: Color, fraction: float) -> Color:
-    return per_channel(lambda a, b: a + (b - a) * fraction, first, second)
-
-
-def per_channel(operation: Callable[..., float], *colors: Color) -> Color:
-    """`operation` on the channels of one or more colours."""
-    red, green, blue = (operation(*channels) for channels in zip(*colors, strict=True))
-    return red, green, blue
-
-
-def _uniform(value: float) -> Color:
-    return value, value, value
-
-
-_BLENDS: dict[str, Callable[[float, float], float]] = {
-    "MIX": lambda a, b: b,
-    "MULTIPLY": lambda a, b: a * b,
-    "ADD": lambda a, b: a + b,
-    "SUBTRACT": lambda a, b: a - b,
-    "SCREEN": lambda a, b: 1.0 - (1.0 - a) * (1.0 - b),
-    "DIVIDE": lambda a, b: a / b if b else a,
-    "DIFFERENCE": lambda a, b: abs(a - b),
-    "DARKEN": min,
-    "LIGHTEN": max,
-    "OVERLAY": lambda a, b: 2.0 * a * b if a < 0.5 else 1.0 - 2.0 * (1.0 - a) * (1.0 - b),
-}
-
-_MATH: dict[str, Callable[..., Any]] = {
-    "ADD": lambda a, b: a + b,
-    "SUBTRACT": lambda a, b: a - b,
-    "MULTIPLY": lambda a, b: a * b,
-    "DIVIDE": lambda a, b: a / b if b else 0.0,
-    "MULTIPLY_ADD": lambda a, b, c: a * b + c,
-    "POWER": lambda a, b: a**b if a > 0.0 or (a != 0.0 and b == int(b)) else 0.0,
-    "SQRT": lambda a: math.sqrt(max(a, 0.0)),
-    "ABSOLUTE": abs,
-    "MINIMUM": min,
-    "MAXIMUM": max,
-    "GREATER_THAN": lambda a, b: float(a > b),
-    "LESS_THAN": lambda a, b: float(a < b),
-}

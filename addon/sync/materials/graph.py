@@ -29,6 +29,11 @@ class Source:
     socket: Socket
     groups: Groups
 
+    @property
+    def key(self) -> tuple[object, ...]:
+        """Tells this output of this node, entered through these groups, from all others of the tree."""
+        return self.node.as_pointer(), self.socket.identifier, *(group.as_pointer() for group in self.groups)
+
 
 def find_source(socket: Socket, groups: Groups) -> Source:
     """What drives the input `socket` of a node inside `groups`."""

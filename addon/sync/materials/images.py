@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import bpy
@@ -92,11 +92,16 @@ class ImageTable:
     def with_mask(self, color: Image | None, mask: Image, component: str) -> Image:
         """An image with the colours of `color` (white if None) and a component of `mask` as its alpha.
 
-        `component`: RGB (luminance), RED, GREEN, BLUE, ALPHA or INVERTED_ALPHA.
+        `component`: LUMINANCE, RED, GREEN, BLUE, ALPHA or INVERTED_ALPHA.
         """
         key = f"{color.key if color else 'white'}+{mask.key}.{component}"
         signature = (color and color.version, mask.version)
         return self._derived(key, signature, lambda: _masked(key, color, mask, component)).image
+
+    def as_grey(self, image: Image, component: str) -> Image:
+        """An opaque image whose three colours are one component of `image` (see `with_mask`)."""
+        key = f"{image.key}.{component}"
+        return self._derived(key, (image.version,), lambda: _greyed(key, image, component)).image
 
     def _premultiplied(self, image: Image) -> ImageRecord:
         key = f"{image.key}.premultiplied"
@@ -126,6 +131,7 @@ def _signature(image: Any) -> tuple[object, ...]:
         (image.generated_width, image.generated_height),
         tuple(image.generated_color),
         tuple(image.size),
+        len(image.tiles),
     )
 
 
@@ -150,10 +156,10 @@ def _read(key: str, image: Any, signature: tuple[object, ...], previous: ImageRe
     pixels = values if image.is_float else np.rint(values * np.float32(255.0)).astype(np.uint8)
     srgb = not image.is_float and not image.colorspace_settings.is_data and space not in _LINEAR_SPACES
     warnings = _limitations(image, srgb)
-    if previous is not None and previous.warnings == warnings and _same_image(previous.image, image.name, pixels, srgb):
-        return replace(previous, signature=_signature(image))
-    mirrored = Image(key=key, name=image.name, version=new_version(), pixels=pixels, srgb=srgb)
     transparent = _has_opacity(image) and bool((values[..., 3] < 1.0).any())
+    if previous is not None and _same_image(previous.image, image.name, pixels, srgb):
+        return ImageRecord(_signature(image), previous.image, previous.mean, warnings, transparent)
+    mirrored = Image(key=key, name=image.name, version=new_version(), pixels=pixels, srgb=srgb)
     return ImageRecord(_signature(image), mirrored, _mean(mirrored), warnings, transparent)
 
 
@@ -226,15 +232,7 @@ def _masked(key: str, color: Image | None, mask: Image, component: str) -> Image
     source = mask if color is None else color
     height = max(source.pixels.shape[0], mask.pixels.shape[0])
     width = max(source.pixels.shape[1], mask.pixels.shape[1])
-    channels = linear(mask)
-    alpha = {
-        "RGB": channels[..., :3] @ np.array([0.2126, 0.7152, 0.0722], np.float32),
-        "RED": channels[..., 0],
-        "GREEN": channels[..., 1],
-        "BLUE": channels[..., 2],
-        "ALPHA": channels[..., 3],
-        "INVERTED_ALPHA": np.float32(1.0) - channels[..., 3],
-    }[component]
+    alpha = _component(mask, component)
     pixels = _repeat(source.pixels, height, width).copy()
     one = np.float32(1.0) if pixels.dtype == np.float32 else np.float32(255.0)
     if color is None:
@@ -244,6 +242,32 @@ def _masked(key: str, color: Image | None, mask: Image, component: str) -> Image
     return Image(
         key=key, name=f"{source.name} with {mask.name}", version=new_version(), pixels=pixels, srgb=source.srgb
     )
+
+
+def _greyed(key: str, image: Image, component: str) -> Image:
+    """See `ImageTable.as_grey`; encoded as `image` is, alpha never."""
+    srgb = image.srgb and "ALPHA" not in component
+    values = _component(image, component)
+    pixels = np.ones((*values.shape, 4), np.float32)
+    pixels[..., :3] = (_srgb_encoded(values) if srgb else values)[..., None]
+    if image.pixels.dtype == np.uint8:
+        pixels = np.rint(pixels * np.float32(255.0)).astype(np.uint8)
+    name = f"{component.lower().replace('_', ' ')} of {image.name}"
+    return Image(key=key, name=name, version=new_version(), pixels=pixels, srgb=srgb)
+
+
+def _component(image: Image, component: str) -> Float32Array:
+    """(H, W) float32 one linear channel of an image, or its luminance."""
+    channels = linear(image)
+    if component == "LUMINANCE":
+        return channels[..., :3] @ np.array([0.2126, 0.7152, 0.0722], np.float32)
+    if component == "INVERTED_ALPHA":
+        return np.float32(1.0) - channels[..., 3]
+    return channels[..., ("RED", "GREEN", "BLUE", "ALPHA").index(component)]
+
+
+def _srgb_encoded(values: Float32Array) -> Float32Array:
+    return np.where(values <= 0.0031308, values * 12.92, 1.055 * values ** (1.0 / 2.4) - 0.055).astype(np.float32)
 
 
 def _premultiply(key: str, image: Image) -> Image:

@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 from operator import add
 
 from ...scene.arrays import Color
-from .expressions import WHITE, Evaluator, Expression, grey, luminance, per_channel, reflectance
+from .expressions import Evaluator, Expression, grey
 from .graph import Groups, Node, Socket, Source, find_source
+from .operations import WHITE, as_value, luminance, per_channel, reflectance, unit
 
 BLACK: Color = (0.0, 0.0, 0.0)
 NOTHING = Expression(BLACK)
@@ -38,11 +39,16 @@ def evaluate_surface(socket: Socket, groups: Groups, evaluator: Evaluator) -> Su
     source = find_source(socket, groups)
     if source.node is None or source.node.mute:
         return Surface(weight=0.0)
+    return evaluator.once(source, _read, Surface(weight=0.0))
+
+
+def _read(source: Source, evaluator: Evaluator) -> Surface:
     reader = _READERS.get(source.node.bl_idname)
     if reader is None:
         evaluator.warn(source.node, f"{source.node.bl_label} is not rendered yet; a diffuse surface is shown instead")
         reader = _unknown
-    return reader(source, evaluator)
+    surface = reader(source, evaluator)
+    return replace(surface, emission=evaluator.limited(surface.emission, source.node))
 
 
 class _Inputs:
@@ -63,16 +69,10 @@ class _Inputs:
         return self._evaluator.value(self.node.inputs[name], self._groups)
 
     def unit(self, name: str) -> float:
-        return min(max(self.value(name), 0.0), 1.0)
+        return unit(self.value(name))
 
     def roughness(self) -> float:
         return self.unit("Roughness")
-
-    def alpha(self) -> Expression:
-        expression = self.expression("Alpha")
-        if expression.attribute is None:
-            return expression
-        return Expression(self._evaluator.reduce(expression, self.node, "alpha"))
 
     def is_used(self, name: str) -> bool:
         """Whether an input exists and is linked or not zero."""
@@ -124,9 +124,9 @@ def _principled(source: Source, evaluator: Evaluator) -> Surface:
         base_color=base_color,
         metallic=metallic,
         roughness=inputs.roughness(),
-        specular=min(max(specular, 0.0), 1.0),
+        specular=unit(specular),
         emission=_emitted(inputs, "Emission Color", "Emission Strength"),
-        alpha=inputs.alpha(),
+        alpha=inputs.expression("Alpha"),
     )
 
 
@@ -175,7 +175,7 @@ def _specular(source: Source, evaluator: Evaluator) -> Surface:
     return Surface(
         base_color=inputs.expression("Base Color"),
         roughness=inputs.roughness(),
-        specular=min(max(luminance(inputs.color("Specular")), 0.0), 1.0),
+        specular=unit(luminance(inputs.color("Specular"))),
         emission=inputs.color("Emissive Color"),
         alpha=grey(1.0 - inputs.unit("Transparency")),
     )
@@ -212,8 +212,7 @@ def _mix(source: Source, evaluator: Evaluator) -> Surface:
     masked = _masked(fraction, first, second)
     if masked is not None:
         return masked
-    value = luminance(evaluator.reduce(fraction, source.node, "the mix factor"))
-    value = min(max(value, 0.0), 1.0)
+    value = unit(as_value(evaluator.reduce(fraction, source.node, "the mix factor")))
     if value in {0.0, 1.0}:
         return second if value else first
     return _blend(first, second, value, source.node, evaluator)
@@ -247,7 +246,7 @@ def _blend(first: Surface, second: Surface, fraction: float, node: Node, evaluat
 
 
 def _constant_alpha(surface: Surface, node: Node, evaluator: Evaluator) -> float:
-    return min(max(luminance(evaluator.reduce(surface.alpha, node, "alpha within a mix")), 0.0), 1.0)
+    return unit(as_value(evaluator.reduce(surface.alpha, node, "alpha within a mix")))
 
 
 def _weighted(
