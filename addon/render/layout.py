@@ -43,6 +43,9 @@ class GBufferChannel:
         return TargetSpec(f"gbuffer.{self.name}", self.components, self.dtype, layers, self.clear)
 
 
+MOTION = GBufferChannel("motion", 2, "f2", "vec2", "pixels moved since the previous frame")
+"""The slot of the motion vectors. No pass reads it yet, so no plan has it and no shader variant writes it."""
+
 CHANNELS = (
     GBufferChannel("view_depth", 1, "f4", "float", "linear depth along the view axis, m; +inf where empty", inf),
     GBufferChannel("normal", 2, "nu2", "vec2", "world-space shading normal facing the viewer, octahedral"),
@@ -50,6 +53,7 @@ CHANNELS = (
     GBufferChannel("material", 2, "f1", "vec2", "metallic, roughness"),
     GBufferChannel("emission", 4, "f4", "vec4", "emitted radiance, W/(sr·m²)"),
     GBufferChannel("object_index", 1, "u2", "uint", "Blender's pass index"),
+    MOTION,
 )
 
 DEPTH_BYTES = 4

@@ -207,7 +207,7 @@ def _read_channels(
     if settings.debug_view in _DEBUG_CHANNELS:
         read.add(_DEBUG_CHANNELS[settings.debug_view])
     if settings.deep_output:
-        read |= {channel.name for channel in CHANNELS if channel.name != "emission"}
+        read |= {"normal", "base_color", "material", "object_index"}
         if any(is_emissive(material) for material in scene.materials.values()):
             read.add("emission")
     left_out += [

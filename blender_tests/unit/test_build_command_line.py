@@ -74,4 +74,4 @@ def test_what_build_py_imports_parses_on_python_3_9(repository):
     files = [repository / "build.py", *(repository / "tooling").glob("*.py")]
     for path in files:
         if path.name not in INSIDE_BLENDER_OR_ENVIRONMENT:
-            ast.parse(path.read_text(encoding="utf-8"), str(path), feature_version=(3, 9))
+            assert ast.parse(path.read_text(encoding="utf-8"), str(path), feature_version=(3, 9)).body

@@ -105,5 +105,12 @@ def test_what_is_read_is_written(deep):
     assert all(set(item.reads) <= written for item in planned.passes)
 
 
+def test_motion_vectors_have_a_slot_that_nothing_fills_yet():
+    everything = replace(SETTINGS, deep_output=True, channels=frozenset(Channel))
+    planned = plan(LIT, everything)
+    assert "gbuffer.motion" not in [target.name for target in planned.targets]
+    assert reasons(planned)["gbuffer motion"] == "no pass or output reads it"
+
+
 def test_a_layer_takes_no_more_than_48_bytes_per_pixel():
     assert sum(channel.target(1).bytes_per_pixel for channel in CHANNELS) + DEPTH_BYTES <= 48

@@ -11,7 +11,7 @@ import numpy as np
 from ...scene import BaseColorSource, ImageTexture, InstanceBatch, Material, Scene
 from ..device import Device
 from ..geometry import split_float64
-from ..layout import CHANNELS, ORACLES, GBufferChannel, outputs_glsl
+from ..layout import CHANNELS, MOTION, ORACLES, GBufferChannel, outputs_glsl
 from ..plan import PlannedPass, is_alpha_tested, is_invisible
 from ..programs import ProgramSpec
 from ..raw_gl import CLIP_DISTANCE0
@@ -80,7 +80,7 @@ class GBufferPass:
     @classmethod
     def variants(cls) -> Iterator[ProgramSpec]:
         """Every surface kind with every set of channels besides view depth, peeling or not, with either depth."""
-        optional = [channel.name for channel in CHANNELS if channel.name != "view_depth"]
+        optional = [channel.name for channel in CHANNELS if channel is not MOTION and channel.name != "view_depth"]
         surfaces = [frozenset(names) for names in ((), ("TEXTURE",), ("TEXTURE", "ALPHA_TEST"), ("ATTRIBUTE",))]
         for names in subsets(optional):
             channels = tuple(channel for channel in CHANNELS if channel.name in names | {"view_depth"})
