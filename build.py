@@ -83,7 +83,13 @@ def command_line() -> argparse.ArgumentParser:
         "--set", type=assignment, action="append", default=[], metavar="NAME=VALUE", help="a setting of the engine"
     )
     render.add_argument("--stats", metavar="FILE.json", help="write timings and counts, one object per repeat")
-    render.add_argument("--repeat", type=positive, default=1, metavar="N", help="render N times in one process")
+    render.add_argument(
+        "--repeat",
+        type=positive,
+        default=1,
+        metavar="N",
+        help="render N times in one process, with Persistent Data: cold, then warm",
+    )
     render.add_argument(
         "--blender", metavar="4.5|5.2|PATH", help="version, or a Blender program that gets the built extension"
     )

@@ -7,6 +7,7 @@ Runs inside Blender (`render_job`) but imports nothing of it; what it reads is d
 from __future__ import annotations
 
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import Any
 
 TRUE = {"true", "1", "on", "yes"}
@@ -19,17 +20,18 @@ class Engine:
     """How to drive one engine.
 
     `identifiers`: Blender's names for it, the newest first. `settings`: attribute of the scene with its own settings.
-    `samples`, `time_limit`: its properties for those two, "" where it has none.
+    `samples`, `time_limit`, `layers_path` (of files beside the picture): its properties, "" where it has none.
     """
 
     identifiers: tuple[str, ...]
     settings: str
     samples: str
     time_limit: str = ""
+    layers_path: str = ""
 
 
 ENGINES = {
-    "DEEP_GBUFFER": Engine(("DEEP_GBUFFER",), "deep_gbuffer", "samples", "time_limit"),
+    "DEEP_GBUFFER": Engine(("DEEP_GBUFFER",), "deep_gbuffer", "samples", "time_limit", "layers_path"),
     "CYCLES": Engine(("CYCLES",), "cycles", "samples", "time_limit"),
     "EEVEE": Engine(("BLENDER_EEVEE", "BLENDER_EEVEE_NEXT"), "eevee", "taa_render_samples"),
     "WORKBENCH": Engine(("BLENDER_WORKBENCH",), "display", "render_aa"),
@@ -53,7 +55,9 @@ def assign(group: Any, name: str, text: str) -> None:
     """
     known = settable(group)
     if name not in known:
-        raise ValueError(f"{group.bl_rna.identifier} has no property {name!r}; it has {', '.join(sorted(known))}.")
+        near = get_close_matches(name, known, n=5)
+        hint = f"did you mean {' or '.join(near)}?" if near else f"it has {', '.join(sorted(known))}."
+        raise ValueError(f"{group.bl_rna.identifier} has no property {name!r}; {hint}")
     try:
         setattr(group, name, parse(known[name], text))
     except TypeError as error:  # an enumeration whose values depend on the scene

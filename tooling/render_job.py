@@ -24,10 +24,11 @@ from tooling.console import INTERRUPTED, MARK
 from tooling.engine_settings import ENGINES, Engine, assign
 
 EXTENSION_REPOSITORY = "user_default"
+BESIDE_THE_BLEND = "//"  # where our layer files go unless the file says otherwise
 # Measured by our engine only; the others' are null.
 STATISTICS = (
     *("sync_s", "upload_s", "first_picture_s", "sample_s", "total_s", "samples", "passes", "left_out"),
-    *("triangles", "draws", "instances", "bytes", "warnings", "engine", "device", "blender"),
+    *("triangles", "draws", "instances", "bytes", "warnings", "files", "engine", "device", "blender"),
 )
 
 
@@ -84,17 +85,25 @@ def choose_engine(scene: bpy.types.Scene, engine: Engine) -> None:
 def apply_settings(scene: bpy.types.Scene, engine: Engine, job: dict[str, Any]) -> None:
     """Resolution, samples, time limit and `--set` of the job. Raises ValueError naming what cannot be set."""
     if job["resolution"]:
-        scene.render.resolution_x, scene.render.resolution_y = job["resolution"]
+        for name, pixels in zip(("resolution_x", "resolution_y"), job["resolution"], strict=True):
+            assign(scene.render, name, str(pixels))
         scene.render.resolution_percentage = 100
     settings = getattr(scene, engine.settings)
     if job["samples"] is not None:
-        assign(settings, engine.samples, str(job["samples"]))
+        try:
+            assign(settings, engine.samples, str(job["samples"]))
+        except ValueError as error:
+            raise JobError(f"--samples {job['samples']}: {error}") from error
     if job["time_limit"] is not None:
         if not engine.time_limit:
             raise JobError(f"{job['engine']} has no time limit.")
         assign(settings, engine.time_limit, str(job["time_limit"]))
+    if engine.layers_path and getattr(settings, engine.layers_path) == BESIDE_THE_BLEND:
+        assign(settings, engine.layers_path, job["layers_path"])
     for name, text in job["set"]:
         assign(settings, name, text)
+    if job["repeat"] > 1:
+        scene.render.use_persistent_data = True
 
 
 def choose_format(scene: bpy.types.Scene, suffix: str) -> None:

@@ -53,10 +53,16 @@ def is_writable(folder: Path) -> bool:
 
 def check_output(output: Path) -> None:
     """Raise ToolError where `output` has another suffix than ours or its folder cannot be written."""
-    if output.suffix not in SUFFIXES:
+    if output.suffix.lower() not in SUFFIXES:
         raise ToolError(f"{output}: the picture is written as .png or .exr.")
     if not output.parent.is_dir() or not is_writable(output.parent):
         raise ToolError(f"{output.parent} is not a folder that can be written.")
+
+
+def check_statistics(path: Path) -> None:
+    """Raise ToolError where no file can be written at `path`."""
+    if path.is_dir() or not path.parent.is_dir() or not is_writable(path.parent):
+        raise ToolError(f"{path}: statistics cannot be written there.")
 
 
 def blender_command(choice: str | None) -> tuple[list[str], bool]:
@@ -86,8 +92,8 @@ def render(options: Namespace) -> int:
         raise ToolError(f"{options.file}: no such file.")
     output = Path(options.output).resolve() if options.output else default_output(source, options.engine)
     check_output(output)
-    if options.stats and not Path(options.stats).resolve().parent.is_dir():
-        raise ToolError(f"{options.stats}: its folder does not exist.")
+    if options.stats:
+        check_statistics(Path(options.stats).resolve())
     if source.suffix == SNAPSHOT_SUFFIX:
         command, real = snapshot_command(options, output), False
     else:
@@ -107,14 +113,18 @@ def render(options: Namespace) -> int:
             "time_limit": options.time_limit,
             "set": options.set,
             "repeat": options.repeat,
-            "suffix": output.suffix,
+            "layers_path": f"{output.with_suffix('')}_",
+            "suffix": output.suffix.lower(),
             "scratch": scratch,
             "extension": extension,
         }
         run = Run(output, numbers=options.frames is not None)
         run.execute([*command, json.dumps(job)], Path(scratch))
     if options.stats:
-        Path(options.stats).write_text(json.dumps(run.statistics, indent=1) + "\n", encoding="utf-8")
+        try:
+            Path(options.stats).write_text(json.dumps(run.statistics, indent=1) + "\n", encoding="utf-8")
+        except OSError as error:
+            raise ToolError(f"{options.stats} could not be written: {error.strerror}.") from error
     return 0
 
 
@@ -178,6 +188,8 @@ class Run:
             self.statistics = content
             for warning in dict.fromkeys(text for entry in content for text in entry["warnings"]):
                 warn(f"warning: {warning}")
+            for path in dict.fromkeys(path for entry in content for path in entry.get("files") or ()):
+                say(f"wrote {path}")
         elif kind == "picture":
             target = numbered(self._output, content["frame"]) if self._numbers else self._output
             put_in_place(Path(content["path"]), target)

@@ -118,6 +118,7 @@ def render(scene: Scene, camera: Camera, settings: RenderSettings, time_limit: f
         "instances": measured.instances,
         "bytes": measured.bytes,
         "warnings": list(measured.warnings),
+        "files": [],
         "engine": "DEEP_GBUFFER",
         "device": measured.device,
         "blender": None,

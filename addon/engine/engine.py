@@ -66,13 +66,14 @@ class DeepGBufferEngine(bpy.types.RenderEngine):
         if layer_name in self._layers:  # Persistent Data: the same engine object renders the next frame
             self._layers.clear()
         self._layers[layer_name] = job.measured
-        statistics.record(scene.name, list(self._layers.values()))
-        warnings = job.measured.warnings
         if scene.render.use_multiview:
-            warnings += (messages.STEREO,)
+            job.measured.warnings += (messages.STEREO,)
         if finished:
-            warnings += layer_output.save(depsgraph, job.scene, job.layers)
-        for text in sessions.unreported(warnings):
+            saved = layer_output.save(depsgraph, job.scene, job.layers)
+            job.measured.files = saved.files
+            job.measured.warnings += saved.failures
+        statistics.record(scene.name, list(self._layers.values()))
+        for text in sessions.unreported(job.measured.warnings):
             self.report({"WARNING"}, text)
 
     def _fail(self, text: str) -> None:

@@ -4,7 +4,7 @@
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import bpy
 
@@ -14,32 +14,46 @@ from ..scene import Scene, snapshot
 from . import messages
 
 
-def save(depsgraph: Any, scene: Scene, layers: Sequence[LayerImages]) -> tuple[str, ...]:
-    """Write the files that the scene asks for. Returns a message for each that could not be written."""
+class Saved(NamedTuple):
+    """Paths of the files that were written, and a message for each that could not be."""
+
+    files: tuple[str, ...]
+    failures: tuple[str, ...]
+
+
+def save(depsgraph: Any, scene: Scene, layers: Sequence[LayerImages]) -> Saved:
+    """Write the files that the scene asks for."""
     ours = depsgraph.scene.deep_gbuffer
     wanted: tuple[tuple[bool, str, str, Callable[[Path], None]], ...] = (
         (ours.save_layers, "layers", "layers.exr", lambda path: output.write_layers(path, layers)),
         (ours.save_deep, "deep samples", "deep.exr", lambda path: output.write_deep(path, layers)),
         (ours.save_snapshot, "scene snapshot", "snapshot.npz", lambda path: snapshot.save(path, scene)),
     )
-    failures = (_write(depsgraph, item, ending, write) for asked, item, ending, write in wanted if asked)
-    return tuple(text for text in failures if text)
+    files: list[str] = []
+    failures: list[str] = []
+    for asked, item, ending, write in wanted:
+        if not asked:
+            continue
+        template = ours.layers_path or "//"
+        if template.startswith("//") and not bpy.data.filepath:
+            failures.append(messages.unsaved(item, template))
+            continue
+        path = _path(depsgraph, template, ending)
+        try:
+            write(path)
+        except OSError as error:
+            failures.append(messages.not_written(item, str(path), error))
+        else:
+            files.append(str(path))
+    return Saved(tuple(files), tuple(failures))
 
 
-def _write(depsgraph: Any, item: str, ending: str, write: Callable[[Path], None]) -> str:
+def _path(depsgraph: Any, template: str, ending: str) -> Path:
     scene = depsgraph.scene
-    template = scene.deep_gbuffer.layers_path
-    if template.startswith("//") and not bpy.data.filepath:
-        return messages.unsaved(item, template)
     several = sum(layer.use for layer in scene.original.view_layers) > 1
     layer_name = depsgraph.view_layer.name if several else ""
     stem = Path(bpy.data.filepath).stem or "untitled"
-    path = Path(bpy.path.abspath(file_name(template, stem, scene.frame_current, layer_name, ending)))
-    try:
-        write(path)
-    except OSError as error:
-        return messages.not_written(item, str(path), error)
-    return ""
+    return Path(bpy.path.abspath(file_name(template, stem, scene.frame_current, layer_name, ending)))
 
 
 def file_name(template: str, blend_name: str, frame: int, view_layer: str, ending: str) -> str:

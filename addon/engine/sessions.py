@@ -83,9 +83,14 @@ def begin_job() -> None:
     _reported.clear()
 
 
-def release() -> None:
-    """Forget every scene and give all GPU data of final renders back."""
+def release_renderers() -> None:
+    """Give the GPU data of final renders back; what was read of their scenes is kept, to read only changes again."""
     for session in _final.values():
         session.release()
+
+
+def release() -> None:
+    """Forget every scene and give all GPU data of final renders back."""
+    release_renderers()
     _final.clear()
     _mirrors.clear()

@@ -23,6 +23,7 @@ class Measured:
     total_s: float = 0.0
     sample_times: list[float] = field(default_factory=list[float])
     warnings: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
     renderer: RenderStatistics | None = None
 
     @property
@@ -42,6 +43,11 @@ def record(scene_name: str, layers: list[Measured]) -> None:
     _last[scene_name] = as_object(layers)
 
 
+def forget(scene_name: str) -> None:
+    """Forget that scene's: another render of it begins, and may fail."""
+    _last.pop(scene_name, None)
+
+
 def clear() -> None:
     """Forget everything."""
     _last.clear()
@@ -53,7 +59,8 @@ def as_object(layers: list[Measured]) -> dict[str, Any]:
     Seconds: `sync_s`, `upload_s`, `total_s` (sums over view layers), `first_picture_s` (until the first sample of
     the first layer is in Blender's result), `sample_s` (median warm sample of all layers).
     `samples` per layer; `passes` [{name, ms}]; `left_out` [{name, reason}]; `triangles`, `draws`, `instances` and
-    `bytes` {target: n} of the layer that has most of them; `warnings` [text]; `engine`, `device`, `blender`.
+    `bytes` {target: n} of the layer that has most of them; `warnings` [text]; `files` [path] of the layer
+    output; `engine`, `device`, `blender`.
     """
     rendered = [layer.renderer for layer in layers if layer.renderer is not None]
     passes: dict[str, float] = {}
@@ -76,6 +83,7 @@ def as_object(layers: list[Measured]) -> dict[str, Any]:
         "instances": max((renderer.instances for renderer in rendered), default=0),
         "bytes": dict(max((renderer.bytes for renderer in rendered), key=lambda item: sum(item.values()), default={})),
         "warnings": list(dict.fromkeys(text for layer in layers for text in layer.warnings)),
+        "files": [path for layer in layers for path in layer.files],
         "engine": ENGINE,
         "device": rendered[-1].device if rendered else "",
         "blender": bpy.app.version_string,

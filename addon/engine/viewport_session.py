@@ -62,7 +62,7 @@ class ViewportSession:
     """Blender's thread calls `show` and `close` and reads `picture` and `error`; jobs run on the GL thread."""
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()  # a future that is done already calls `_rendered` from within `_queue`
         self._view: View | None = None
         self._picture: Picture | None = None
         self._error: str | None = None
@@ -150,7 +150,10 @@ class ViewportSession:
         """Go on with the next sample or the next view; runs on the GL thread."""
         with self._lock:
             self._queued = False
-            if future.cancelled() or self._closed:
+            if future.cancelled():  # the GL thread was stopped, and the renderer's context with it
+                self._view = self._begun = self._renderer = None
+                return
+            if self._closed:
                 return
             error = future.exception()
             newer = self._view is not self._attempted

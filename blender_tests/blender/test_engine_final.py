@@ -151,6 +151,7 @@ def test_statistics_have_the_documented_keys(plane_scene, tmp_path):
         "instances",
         "bytes",
         "warnings",
+        "files",
         "engine",
         "device",
         "blender",
@@ -325,3 +326,36 @@ def test_loading_another_file_frees_what_was_kept(plane_scene, tmp_path):
     bpy.ops.wm.read_homefile(use_factory_startup=True)
     assert not sessions._final
     assert statistics.last("Scene") is None
+
+
+def test_what_could_not_be_written_is_in_the_statistics(plane_scene, tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    ours = plane_scene.deep_gbuffer
+    ours.save_deep = True
+    ours.layers_path = str(tmp_path / "file" / "shot_")
+    render(plane_scene, tmp_path)
+    last = statistics.last(plane_scene.name)
+    assert last["files"] == []
+    assert any("deep samples were not written" in text for text in last["warnings"])
+    ours.layers_path = str(tmp_path / "shot_")
+    render(plane_scene, tmp_path)
+    last = statistics.last(plane_scene.name)
+    assert last["files"] == [str(tmp_path / "shot_0001_deep.exr")]
+    assert not any("not written" in text for text in last["warnings"])
+
+
+def test_a_render_that_fails_has_no_statistics_of_the_one_before(plane_scene, tmp_path):
+    render(plane_scene, tmp_path)
+    assert statistics.last(plane_scene.name) is not None
+    plane_scene.render.resolution_x = 60_000
+    with pytest.raises(RuntimeError, match="60000"):
+        bpy.ops.render.render()
+    assert statistics.last(plane_scene.name) is None
+
+
+@pytest.mark.parametrize("persistent", [False, True])
+def test_gpu_data_is_kept_only_with_persistent_data(plane_scene, tmp_path, persistent):
+    plane_scene.render.use_persistent_data = persistent
+    render(plane_scene, tmp_path)
+    kept = [session.renderer is not None for session in sessions._final.values()]
+    assert any(kept) == persistent

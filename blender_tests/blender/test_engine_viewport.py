@@ -326,3 +326,21 @@ def test_an_error_is_painted_as_text(with_gpu, monkeypatch):
         assert painted[..., 0].max() > 0.5
 
     with_gpu(work)
+
+
+def test_stopping_the_gl_thread_while_a_view_refines_ends_and_the_view_can_be_shown_again(session):
+    """A future that is done already calls back at once, inside the lock: this would hang with a plain one."""
+    endless = RenderSettings(24, 16, samples=1_000_000)
+    session.show(SCENE, camera(), endless)
+    while session.picture is None:
+        gl_thread().submit(lambda _device: None).result(timeout=60)
+    stopper = threading.Thread(target=stop_gl_thread, daemon=True)
+    stopper.start()
+    stopper.join(60)
+    assert not stopper.is_alive()
+    assert not session.busy
+    before = session.revision
+    session.show(SCENE, camera(), endless)
+    while session.revision == before:
+        gl_thread().submit(lambda _device: None).result(timeout=60)
+    assert session.error is None

@@ -75,3 +75,13 @@ def test_what_build_py_imports_parses_on_python_3_9(repository):
     for path in files:
         if path.name not in INSIDE_BLENDER_OR_ENVIRONMENT:
             assert ast.parse(path.read_text(encoding="utf-8"), str(path), feature_version=(3, 9)).body
+
+
+def test_statistics_go_into_a_file_that_can_be_written(tmp_path):
+    from tooling.console import ToolError
+    from tooling.rendering import check_statistics
+
+    check_statistics(tmp_path / "s.json")
+    for path in (tmp_path, tmp_path / "nowhere" / "s.json"):
+        with pytest.raises(ToolError, match="statistics cannot be written there"):
+            check_statistics(path)

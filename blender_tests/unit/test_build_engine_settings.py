@@ -87,5 +87,5 @@ def test_an_unknown_name_lists_the_known_ones():
     group = SimpleNamespace(bl_rna=SimpleNamespace(identifier="Settings", properties=properties))
     assign(group, "layers", "3")
     assert group.layers == 3
-    with pytest.raises(ValueError, match=r"Settings has no property 'lairs'; it has layers\."):
+    with pytest.raises(ValueError, match=r"Settings has no property 'lairs'; did you mean layers\?"):
         assign(group, "lairs", "3")
