@@ -70,7 +70,7 @@ def run(
     `env` is added to a small environment of its own. Raises subprocess.TimeoutExpired after `timeout` seconds; the
     command and everything it started is ended then, and when it returns.
     """
-    surroundings = {"PATH": SEARCH_PATH, "HOME": "/root", "LANG": "C.UTF-8", **(env or {})}
+    surroundings = {"PATH": SEARCH_PATH, "HOME": "/", "LANG": "C.UTF-8", **(env or {})}
     child = subprocess.Popen(
         [_chroot(), str(root), *argv],
         stdin=subprocess.DEVNULL,
