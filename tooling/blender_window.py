@@ -90,17 +90,6 @@ def run(
     return subprocess.CompletedProcess(list(argv), child.returncode, output, "")
 
 
-def copy_in(root: Path, source: Path, destination: str) -> Path:
-    """Copy a file or folder to the absolute path `destination` inside the chroot; its path seen from outside."""
-    target = root / destination.lstrip("/")
-    target.parent.mkdir(parents=True, exist_ok=True)
-    if source.is_dir():
-        shutil.copytree(source, target, dirs_exist_ok=True)
-    else:
-        shutil.copy2(source, target)
-    return target
-
-
 def mirror(apt: Path) -> str | None:
     """The Debian archive in apt's configuration folder: the first with a component `main` that is no security archive.
 

@@ -29,7 +29,7 @@ class TargetSpec:
 
 @dataclass(frozen=True)
 class GBufferChannel:
-    """One channel: its format and the GLSL output that writes it; `meaning` is for the README's table."""
+    """One channel: its format and the GLSL output that writes it; `meaning` is its row in the README's table."""
 
     name: str
     components: int

@@ -29,14 +29,13 @@ class LeftOut:
 class Plan:
     """The passes of one sample in order, what was left out, and how the deep G-buffer is laid out.
 
-    `layers`: how many are built. `channels`: those that somebody reads. `film_channels`: images that are accumulated.
+    `layers`: how many are built. `channels`: those that somebody reads.
     """
 
     passes: tuple[PlannedPass, ...]
     left_out: tuple[LeftOut, ...]
     layers: int
     channels: tuple[GBufferChannel, ...]
-    film_channels: frozenset[Channel]
 
     def find(self, name: str) -> PlannedPass | None:
         """The planned pass of that name, or None where it was left out."""
@@ -94,7 +93,7 @@ def plan(scene: Scene, settings: RenderSettings) -> Plan:
         defines=frozenset({"PEEL"} if layers > 1 else ()),
     )
     passes = (gbuffer, *((direct,) if direct else ()), _plan_composite(scene, settings, direct))
-    return Plan(passes, tuple(left_out), layers, channels, settings.channels | {Channel.COMBINED})
+    return Plan(passes, tuple(left_out), layers, channels)
 
 
 def is_emissive(material: Material) -> bool:

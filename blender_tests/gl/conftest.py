@@ -4,7 +4,7 @@
 import pytest
 
 from addon.render import Renderer, gl_thread, stop_gl_thread
-from addon.scene import RenderSettings
+from addon.scene import Channel, RenderSettings
 
 
 class View:
@@ -38,7 +38,7 @@ def render():
                 plan = renderer.begin(scene, camera, settings)
                 for _ in range(samples):
                     renderer.render_sample()
-                images = {channel: renderer.read(channel) for channel in plan.film_channels}
+                images = {channel: renderer.read(channel) for channel in {*settings.channels, Channel.COMBINED}}
                 layers = [renderer.read_layer(k) for k in range(plan.layers)] if settings.deep_output else []
                 return View(images, layers, renderer.statistics(), plan)
             finally:

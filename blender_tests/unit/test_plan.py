@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -114,3 +115,12 @@ def test_motion_vectors_have_a_slot_that_nothing_fills_yet():
 
 def test_a_layer_takes_no_more_than_48_bytes_per_pixel():
     assert sum(channel.target(1).bytes_per_pixel for channel in CHANNELS) + DEPTH_BYTES <= 48
+
+
+def test_the_readme_lists_every_channel_as_it_is():
+    formats = {("f4", 1): "R32F", ("nu2", 2): "RG16", ("f2", 4): "RGBA16F", ("f1", 2): "RG8", ("f4", 4): "RGBA32F"}
+    formats |= {("u2", 1): "R16UI", ("f2", 2): "RG16F"}
+    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    for channel in CHANNELS:
+        assert f"| {channel.name} | {formats[channel.dtype, channel.components]} | {channel.meaning} |" in readme
+    assert f"{sum(channel.target(1).bytes_per_pixel for channel in CHANNELS)} bytes per pixel and layer" in readme
