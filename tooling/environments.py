@@ -64,7 +64,7 @@ def blender_python(version: str | None = None) -> Path:
 
 
 def development_python() -> Path:
-    """The interpreter with ruff, pyright, import-linter and type stubs, set up. Raises ToolError without a Python."""
+    """The interpreter with linters, type stubs and matplotlib, set up. Raises ToolError without a Python."""
     return _any_python("development")
 
 

@@ -19,7 +19,8 @@ sys.path.append(str(Path(__file__).resolve().parent.parent))
 
 from addon.output import write_channels
 from addon.render import Device, DeviceError, Renderer, RenderError, ShaderError, gl_thread, stop_gl_thread
-from addon.scene import Camera, Channel, RenderSettings, Scene, snapshot
+from addon.scene import Channel, Moment, RenderSettings, Scene, Sequence, snapshot
+from addon.scene.snapshot import Snapshot
 from tooling.console import INTERRUPTED, MARK
 from tooling.engine_settings import FALSE, TRUE
 
@@ -66,6 +67,19 @@ def parse(kind: type, text: str) -> object:
     return kind(text)
 
 
+def frames_of(loaded: Snapshot, file: str) -> tuple[Moment, Sequence]:
+    """The frame to render and what the snapshot holds of those before it. Raises JobError where there is no camera."""
+    frame = moment(loaded.scene)
+    if frame is None:
+        raise JobError(f"{file}: the scene has no camera.")
+    return frame, Sequence(previous=moment(loaded.previous), earlier=moment(loaded.earlier))
+
+
+def moment(scene: Scene | None) -> Moment | None:
+    """A scene as its own camera sees it; None where there is nothing to see or nobody to see it."""
+    return None if scene is None or scene.camera is None else Moment(scene, scene.camera)
+
+
 def finished(future: "Future[T]") -> T:
     """The result of a job on the GL thread; a signal is handled while waiting."""
     while not future.done():
@@ -73,7 +87,7 @@ def finished(future: "Future[T]") -> T:
     return future.result()
 
 
-def render(scene: Scene, camera: Camera, settings: RenderSettings, time_limit: float) -> dict[str, Any]:
+def render(frame: Moment, sequence: Sequence, settings: RenderSettings, time_limit: float) -> dict[str, Any]:
     """Render once; statistics with the key `picture`, (H, W, 4) float32, beside those of the engine."""
     started = time.perf_counter()
     samples: list[float] = []
@@ -83,7 +97,7 @@ def render(scene: Scene, camera: Camera, settings: RenderSettings, time_limit: f
 
     def begin(device: Device) -> Renderer:
         renderer = Renderer(device)
-        renderer.begin(scene, camera, settings)
+        renderer.begin(frame.scene, frame.camera, settings, sequence)
         return renderer
 
     def sample(device: Device) -> int:
@@ -127,11 +141,9 @@ def render(scene: Scene, camera: Camera, settings: RenderSettings, time_limit: f
 
 def run(job: dict[str, Any]) -> None:
     """Do the job. Raises JobError, OSError or the renderer's errors with a message for a person."""
-    scene = snapshot.load(job["file"])
-    if scene.camera is None:
-        raise JobError(f"{job['file']}: the scene has no camera.")
+    frame, sequence = frames_of(snapshot.load(job["file"]), job["file"])
     settings = settings_of(job)
-    entries = [render(scene, scene.camera, settings, job["time_limit"] or 0.0) for _ in range(job["repeat"])]
+    entries = [render(frame, sequence, settings, job["time_limit"] or 0.0) for _ in range(job["repeat"])]
     picture = [entry.pop("picture") for entry in entries][-1]
     path = Path(job["scratch"]) / "picture.exr"
     write_channels(path, {letter: picture[..., index] for index, letter in enumerate("RGBA")})

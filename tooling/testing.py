@@ -139,11 +139,11 @@ def outcome_of(code: int, counts: dict[str, int]) -> Outcome:
 
 
 def bench(options: Namespace) -> int:
-    """Run the named bench, or all of them, in the newest Blender; exit code 1 where one failed."""
+    """Run the named bench, or all of them, without Blender; exit code 1 where one failed."""
     known = {path.stem: path for path in sorted(BENCHES.glob("[!_]*.py"))}
     if not known or options.name not in {None, *known}:
         raise ToolError(f"No such bench; there is {', '.join(known) or 'none yet'}.")
-    python = environments.blender_python()
+    python = environments.development_python()
     failed: list[str] = []
     for name in [options.name] if options.name else known:
         say(f"== bench: {name}")

@@ -2,7 +2,7 @@
 """Scene -> images through a deep G-buffer. Knows OpenGL and the scene contract, nothing of Blender."""
 
 from .device import Device, DeviceError, GLThread, RenderError, gl_thread, stop_gl_thread
-from .plan import LeftOut, Plan, PlannedPass, plan
+from .plan import LeftOut, Plan, PlannedPass, frames_before, plan
 from .programs import ShaderError
 from .readback import LayerImages
 from .renderer import Renderer
@@ -20,6 +20,7 @@ __all__ = [
     "RenderStatistics",
     "Renderer",
     "ShaderError",
+    "frames_before",
     "gl_thread",
     "plan",
     "stop_gl_thread",

@@ -15,9 +15,10 @@ from typing import Any, TypeVar
 
 import moderngl
 
+from ..scene import Layering
 from .ggx_albedo import TABLE_SIZE, ggx_albedo_table
 from .programs import ProgramLibrary
-from .raw_gl import RawGL
+from .raw_gl import RawGL, vertex_layer_extension
 
 T = TypeVar("T")
 
@@ -38,6 +39,7 @@ class Device:
     def __init__(self) -> None:
         self.context = _create_context()
         self.raw = RawGL(self.context)
+        self.no_framebuffer = self.context.detect_framebuffer(0)
         self.zero_to_one_depth = self.raw.set_clip_space(zero_to_one=True)
         self.programs = ProgramLibrary(self.context)
         self.ggx_albedo = self.context.texture((TABLE_SIZE, TABLE_SIZE), 2, ggx_albedo_table(), dtype="f4")
@@ -45,6 +47,8 @@ class Device:
         self.name = f"{self.context.info['GL_RENDERER']}, OpenGL {self.context.info['GL_VERSION']}"
         self.maximum_size = min(self.context.info["GL_MAX_TEXTURE_SIZE"], *self.context.info["GL_MAX_VIEWPORT_DIMS"])
         self.is_software = any(word in self.name.lower() for word in ("llvmpipe", "softpipe", "swrast", "swiftshader"))
+        self.vertex_layer_extension = vertex_layer_extension(self.context)
+        self.fastest_layering: Layering | None = None
         self.idle_queries: list[moderngl.Query] = []
         self.uniform_alignment: int = self.context.info["GL_UNIFORM_BUFFER_OFFSET_ALIGNMENT"]
 

@@ -37,6 +37,6 @@ class Film:
 
     def mean(self, pool: TexturePool, channel: Channel) -> Float32Array:
         """The mean over the samples so far, (H, W, C) float32, row 0 at the bottom."""
-        width, height = pool.size
+        width, height = pool.picture_size
         sums = np.frombuffer(pool.read(film_target(channel).name), np.float32).reshape(height, width, 4)
         return sums[..., : CHANNEL_COMPONENTS[channel]] / np.float32(max(self.samples, 1))

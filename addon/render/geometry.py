@@ -1,28 +1,32 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The scene's geometry on the GPU: buffers mirror meshes and batches, and only what changed is uploaded."""
+"""Scenes' geometry on the GPU: buffers mirror meshes and batches by version, and only what changed is uploaded."""
 
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, Protocol, TypeVar
 
 import moderngl
 import numpy as np
 
 from ..scene import InstanceBatch, Mesh, Scene
-from ..scene.arrays import Float32Array, Float64Array
+from ..scene.arrays import Float32Array, Float64Array, Int64Array
+from ..scene.correspondence import Correspondence
 from .device import Device
 
 MESH_ATTRIBUTES = ("3f", "in_position"), ("3f", "in_normal"), ("2f", "in_uv"), ("4f", "in_color")
 INSTANCE_FORMAT = "4f 4f 4f 3f 1i/i"
 INSTANCE_ATTRIBUTES = ("in_row_0", "in_row_1", "in_row_2", "in_translation_low", "in_object_index")
 _INSTANCE_DTYPE = np.dtype([("rows", "f4", (3, 4)), ("translation_low", "f4", 3), ("object_index", "i4")])
+_POSES_PER_ROW = 1024
+_TEXELS_PER_POSE = 4
 
 
 class MeshBuffers:
     """Vertex and index buffers of one mesh."""
 
     def __init__(self, context: moderngl.Context, mesh: Mesh) -> None:
-        self.version = mesh.version
         arrays = (mesh.positions, mesh.normals, mesh.uvs, mesh.colors)
+        self.positions = mesh.positions
         self.attributes = [
             (context.buffer(np.ascontiguousarray(array, np.float32)), layout, name)
             for array, (layout, name) in zip(arrays, MESH_ATTRIBUTES, strict=True)
@@ -42,12 +46,53 @@ class InstanceBuffer:
     """Per-instance data of one batch."""
 
     def __init__(self, context: moderngl.Context, batch: InstanceBatch) -> None:
-        self.version = batch.version
         self.buffer = context.buffer(pack_instances(batch))
+        self.bytes = self.buffer.size
 
     def release(self) -> None:
         """Free the buffer."""
         self.buffer.release()
+
+
+class PositionBuffer:
+    """Where the vertices of a mesh are at another time."""
+
+    def __init__(self, context: moderngl.Context, positions: Float32Array) -> None:
+        self.positions = positions  # kept alive: it is known by identity
+        self.buffer = context.buffer(np.ascontiguousarray(positions, np.float32))
+        self.bytes = self.buffer.size
+
+    def release(self) -> None:
+        """Free the buffer."""
+        self.buffer.release()
+
+
+class PoseTexture:
+    """Where the instances of a batch are at another time: four RGBA32F texels each, three matrix rows and the low parts
+    of the translation, in the order of the batch's instance buffer."""
+
+    def __init__(self, context: moderngl.Context, batch: InstanceBatch, matrices: Float64Array) -> None:
+        self.matrices = matrices  # kept alive: it is known by identity
+        rows, low = _split_poses(matrices[drawing_order(batch)])
+        height = max(-(-batch.count // _POSES_PER_ROW), 1)
+        texels = np.zeros((height * _POSES_PER_ROW, _TEXELS_PER_POSE, 4), np.float32)
+        texels[: batch.count, :3] = rows
+        texels[: batch.count, 3, :3] = low
+        self.texture = context.texture((_POSES_PER_ROW * _TEXELS_PER_POSE, height), 4, texels, dtype="f4")
+        self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self.bytes = texels.nbytes
+
+    def release(self) -> None:
+        """Free the texture."""
+        self.texture.release()
+
+
+@dataclass(frozen=True)
+class OtherTimes:
+    """The other frames that a draw needs to know each vertex's place in: the previous one, and one ahead."""
+
+    previous: Correspondence | None = None
+    following: Correspondence | None = None
 
 
 def split_float64(values: Float64Array) -> tuple[Float32Array, Float32Array]:
@@ -60,86 +105,169 @@ def split_float64(values: Float64Array) -> tuple[Float32Array, Float32Array]:
     return high, (values - high).astype(np.float32)
 
 
+def drawing_order(batch: InstanceBatch) -> Int64Array:
+    """The rows (N,) of a batch in the order of their ids: coincident instances do not depend on who came first."""
+    return np.argsort(batch.ids, kind="stable")
+
+
 def pack_instances(batch: InstanceBatch) -> bytes:
-    """Matrix rows, low parts of the translations and pass indices, as the vertex shader reads them."""
+    """Matrix rows, low parts of the translations and pass indices in drawing order, as the vertex shader reads them."""
+    order = drawing_order(batch)
     packed = np.empty(batch.count, _INSTANCE_DTYPE)
-    packed["rows"] = batch.matrices[:, :3, :]
-    packed["rows"][:, :, 3], packed["translation_low"] = split_float64(batch.matrices[:, :3, 3])
-    packed["object_index"] = batch.object_index
+    packed["rows"], packed["translation_low"] = _split_poses(batch.matrices[order])
+    packed["object_index"] = batch.object_index[order]
     return packed.tobytes()
 
 
-class GeometryStore:
-    """GPU mirror of `Scene.meshes` and `Scene.batches`.
+def _split_poses(matrices: Float64Array) -> tuple[Float32Array, Float32Array]:
+    """(N, 3, 4) rows with the high parts of the translations, and (N, 3) the low parts."""
+    rows = matrices[:, :3, :].astype(np.float32)
+    rows[:, :, 3], low = split_float64(matrices[:, :3, 3])
+    return rows, low
 
-    `generation` changes whenever vertex arrays that were handed out are no longer valid.
-    """
+
+class _Uploaded(Protocol):
+    bytes: int
+
+    def release(self) -> None: ...
+
+
+T = TypeVar("T", bound=_Uploaded)
+
+
+class _Uploads(Generic[T]):
+    """Things on the GPU by key."""
+
+    def __init__(self, device: Device) -> None:
+        self._device = device
+        self._held: dict[Hashable, T] = {}
+        self.used: set[Hashable] = set()
+
+    def get(self, key: Hashable, make: Callable[[], T], label: str) -> T:
+        """The thing of a key, made where it is not there. Raises RenderError with its label where memory is short."""
+        self.used.add(key)
+        if key not in self._held:
+            made = self._held[key] = make()
+            self._device.check_upload(label, made.bytes)
+        return self._held[key]
+
+    def keep(self, keys: set[Hashable]) -> bool:
+        """Free all others and forget what was used; whether any was freed."""
+        stale = self._held.keys() - keys
+        for key in stale:
+            self._held.pop(key).release()
+        self.used = set()
+        return bool(stale)
+
+    def bytes(self) -> int:
+        """Bytes of all that is held."""
+        return sum(item.bytes for item in self._held.values())
+
+
+class GeometryStore:
+    """GPU mirror of scenes, by key and version: what two frames have in common is there once."""
 
     def __init__(self, device: Device) -> None:
         self._device = device
         self._context = device.context
-        self._meshes: dict[str, MeshBuffers] = {}
-        self._batches: dict[str, InstanceBuffer] = {}
-        self.generation = 0
-        self._vertex_arrays: dict[tuple[str, str, moderngl.Program], moderngl.VertexArray] = {}
+        self._meshes = _Uploads[MeshBuffers](device)
+        self._batches = _Uploads[InstanceBuffer](device)
+        self._positions = _Uploads[PositionBuffer](device)
+        self._poses = _Uploads[PoseTexture](device)
+        self._vertex_arrays: dict[Hashable, moderngl.VertexArray] = {}
 
-    def update(self, scene: Scene) -> None:
-        """Mirror the scene. Raises RenderError naming the mesh that graphics memory has no room for."""
-        replaced = self._drop(
-            self._meshes, (key for key, held in self._meshes.items() if _is_stale(held, scene.meshes.get(key)))
+    def update(self, scenes: Sequence[Scene]) -> None:
+        """Mirror these scenes, and of other times what was drawn since the last update.
+
+        Raises RenderError naming the mesh that graphics memory has no room for.
+        """
+        meshes = {_mesh_key(mesh) for scene in scenes for mesh in _drawn_meshes(scene)}
+        batches = {_batch_key(batch) for scene in scenes for batch in scene.batches}
+        freed = (
+            self._meshes.keep(meshes),
+            self._batches.keep(batches),
+            self._positions.keep(self._positions.used),
+            self._poses.keep(self._poses.used),
         )
-        batches = {batch.key: batch for batch in scene.batches}
-        replaced |= self._drop(
-            self._batches, (key for key, held in self._batches.items() if _is_stale(held, batches.get(key)))
-        )
-        if replaced:
+        if any(freed):
             self._release_vertex_arrays()
-        for batch in scene.batches:
-            if batch.mesh not in self._meshes:
-                mesh = scene.meshes[batch.mesh]
-                held = self._meshes[batch.mesh] = MeshBuffers(self._context, mesh)
-                self._device.check_upload(f'mesh "{mesh.name}"', held.bytes)
-            if batch.key not in self._batches:
-                placed = self._batches[batch.key] = InstanceBuffer(self._context, batch)
-                self._device.check_upload(f'{batch.count} instances of mesh "{batch.mesh}"', placed.buffer.size)
+        for scene in scenes:
+            for mesh in _drawn_meshes(scene):
+                self._mesh(mesh)
+            for batch in scene.batches:
+                self._batch(batch)
 
-    def vertex_array(self, batch: InstanceBatch, program: moderngl.Program) -> moderngl.VertexArray:
-        """The vertex array that draws a batch with a program."""
-        key = (batch.key, batch.mesh, program)
+    def vertex_array(
+        self, scene: Scene, batch: InstanceBatch, program: moderngl.Program, times: OtherTimes, copies: int
+    ) -> moderngl.VertexArray:
+        """The vertex array that draws a batch of a scene with a program, each instance `copies` times in a row."""
+        mesh = scene.meshes[batch.mesh]
+        moved = [
+            (self._positions_at(mesh, other), name)
+            for other, name in ((times.previous, "in_previous_position"), (times.following, "in_next_position"))
+            if other is not None and name in program
+        ]
+        names = tuple(buffer.glo for buffer, _ in moved)
+        key = (_batch_key(batch), _mesh_key(mesh), program, names, copies)
         if key not in self._vertex_arrays:
-            mesh = self._meshes[batch.mesh]
-            content: list[tuple[Any, ...]] = [attribute for attribute in mesh.attributes if attribute[2] in program]
+            buffers = self._mesh(mesh)
+            content: list[tuple[Any, ...]] = [attribute for attribute in buffers.attributes if attribute[2] in program]
+            content += [(buffer, "3f", name) for buffer, name in moved]
             used = [name for name in INSTANCE_ATTRIBUTES if name in program]
             instance_layout = INSTANCE_FORMAT if "in_object_index" in program else "4f 4f 4f 3f 4x/i"
-            content.append((self._batches[batch.key].buffer, instance_layout, *used))
-            self._vertex_arrays[key] = self._context.vertex_array(program, content, mesh.indices, index_element_size=4)
+            content.append((self._batch(batch).buffer, instance_layout, *used))
+            vertex_array = self._context.vertex_array(program, content, buffers.indices, index_element_size=4)
+            if copies > 1:
+                for name in used:
+                    location = program[name].location  # pyright: ignore[reportAttributeAccessIssue]
+                    self._device.raw.set_attribute_divisor(vertex_array, location, copies)
+            self._vertex_arrays[key] = vertex_array
         return self._vertex_arrays[key]
 
+    def poses(self, batch: InstanceBatch, other: Correspondence) -> moderngl.Texture:
+        """Where the instances of a batch are in another frame. Raises RenderError where memory does not suffice."""
+        matrices = other.matrices(batch)
+        key = (batch.key, batch.version, id(matrices))
+        label = f'{batch.count} earlier or later places of mesh "{batch.mesh}"'
+        return self._poses.get(key, lambda: PoseTexture(self._context, batch, matrices), label).texture
+
     def bytes(self) -> int:
-        """Bytes of all buffers."""
-        return sum(mesh.bytes for mesh in self._meshes.values()) + sum(
-            batch.buffer.size for batch in self._batches.values()
-        )
+        """Bytes of all buffers and textures of poses."""
+        return sum(uploads.bytes() for uploads in (self._meshes, self._batches, self._positions, self._poses))
 
     def release(self) -> None:
         """Free everything."""
         self._release_vertex_arrays()
-        self._drop(self._meshes, list(self._meshes))
-        self._drop(self._batches, list(self._batches))
+        for uploads in (self._meshes, self._batches, self._positions, self._poses):
+            uploads.keep(set())
+
+    def _mesh(self, mesh: Mesh) -> MeshBuffers:
+        return self._meshes.get(_mesh_key(mesh), lambda: MeshBuffers(self._context, mesh), f'mesh "{mesh.name}"')
+
+    def _batch(self, batch: InstanceBatch) -> InstanceBuffer:
+        label = f'{batch.count} instances of mesh "{batch.mesh}"'
+        return self._batches.get(_batch_key(batch), lambda: InstanceBuffer(self._context, batch), label)
+
+    def _positions_at(self, mesh: Mesh, other: Correspondence) -> moderngl.Buffer:
+        positions = other.positions(mesh)
+        if positions is mesh.positions:
+            return self._mesh(mesh).attributes[0][0]
+        label = f'earlier or later vertices of mesh "{mesh.name}"'
+        return self._positions.get(id(positions), lambda: PositionBuffer(self._context, positions), label).buffer
 
     def _release_vertex_arrays(self) -> None:
-        self.generation += 1
         for vertex_array in self._vertex_arrays.values():
             vertex_array.release()
         self._vertex_arrays.clear()
 
-    @staticmethod
-    def _drop(held: "dict[str, MeshBuffers] | dict[str, InstanceBuffer]", keys: Iterable[str]) -> bool:
-        stale = list(keys)
-        for key in stale:
-            held.pop(key).release()
-        return bool(stale)
+
+def _drawn_meshes(scene: Scene) -> list[Mesh]:
+    return [scene.meshes[batch.mesh] for batch in scene.batches]
 
 
-def _is_stale(held: MeshBuffers | InstanceBuffer, current: Mesh | InstanceBatch | None) -> bool:
-    return current is None or current.version != held.version
+def _mesh_key(mesh: Mesh) -> Hashable:
+    return mesh.key, mesh.version
+
+
+def _batch_key(batch: InstanceBatch) -> Hashable:
+    return batch.key, batch.version

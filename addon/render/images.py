@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Image textures and samplers on the GPU."""
 
+from collections.abc import Mapping
+
 import moderngl
 import numpy as np
 
-from ..scene import Extension, Image, ImageTexture, Interpolation, Scene
+from ..scene import Extension, Image, ImageTexture, Interpolation
 from .device import Device
 from .raw_gl import SRGB8_ALPHA8
 
@@ -17,15 +19,17 @@ class ImageStore:
         self._textures: dict[str, tuple[int, moderngl.Texture]] = {}
         self._samplers: dict[tuple[Extension, Interpolation], moderngl.Sampler] = {}
 
-    def update(self, scene: Scene) -> list[str]:
-        """Mirror the scene's images; returns warnings for those that had to be made smaller.
+    def update(self, images: Mapping[str, Image]) -> list[str]:
+        """Mirror these images, by key; returns warnings for those that had to be made smaller.
 
         Raises RenderError naming the image that graphics memory has no room for.
         """
-        for key in [key for key, (version, _) in self._textures.items() if _version(scene, key) != version]:
+        for key in [
+            key for key, (version, _) in self._textures.items() if key not in images or images[key].version != version
+        ]:
             self._textures.pop(key)[1].release()
         warnings: list[str] = []
-        for key, image in scene.images.items():
+        for key, image in images.items():
             if key not in self._textures:
                 self._textures[key] = (image.version, self._upload(image, warnings))
         return warnings
@@ -89,8 +93,3 @@ class ImageStore:
                 self._device.raw.mirror_repeat(sampler)
             self._samplers[key] = sampler
         return self._samplers[key]
-
-
-def _version(scene: Scene, key: str) -> int | None:
-    image = scene.images.get(key)
-    return None if image is None else image.version

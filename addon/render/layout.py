@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from math import inf
 
 _BYTES = {"f4": 4, "f2": 2, "f1": 1, "nu2": 2, "u2": 2}
+_OPENGL_NAMES = {"f4": "32F", "f2": "16F", "f1": "8", "nu2": "16", "u2": "16UI"}
 
 
 @dataclass(frozen=True)
@@ -12,7 +13,8 @@ class TargetSpec:
     """A texture array that passes write and read.
 
     `components` 1, 2 or 4 of moderngl's `dtype` (f4/f2 floats, f1/nu2 normalised 8/16 bit, u2 unsigned 16 bit).
-    `layers`: array size. `clear`: value of every component where nothing is drawn.
+    `layers`: array size. `clear`: value of every component where nothing is drawn. `guarded`: whether the guard band
+    surrounds it; otherwise it has the picture's own size.
     """
 
     name: str
@@ -20,6 +22,7 @@ class TargetSpec:
     dtype: str
     layers: int = 1
     clear: float = 0.0
+    guarded: bool = True
 
     @property
     def bytes_per_pixel(self) -> int:
@@ -29,7 +32,10 @@ class TargetSpec:
 
 @dataclass(frozen=True)
 class GBufferChannel:
-    """One channel: its format and the GLSL output that writes it; `meaning` is its row in the README's table."""
+    """One channel: its format and the GLSL output that writes it.
+
+    `meaning` is its row in the README's table; `group` names the pass that writes it.
+    """
 
     name: str
     components: int
@@ -37,36 +43,57 @@ class GBufferChannel:
     glsl_type: str
     meaning: str
     clear: float = 0.0
+    group: str = "gbuffer"
 
     def target(self, layers: int) -> TargetSpec:
         """The texture array that holds this channel for `layers` layers."""
-        return TargetSpec(f"gbuffer.{self.name}", self.components, self.dtype, layers, self.clear)
+        return TargetSpec(f"{self.group}.{self.name}", self.components, self.dtype, layers, self.clear)
 
-
-MOTION = GBufferChannel("motion", 2, "f2", "vec2", "pixels moved since the previous frame")
-"""The slot of the motion vectors. No pass reads it yet, so no plan has it and no shader variant writes it."""
 
 CHANNELS = (
     GBufferChannel("view_depth", 1, "f4", "float", "linear depth along the view axis, m; +inf where empty", inf),
     GBufferChannel("normal", 2, "nu2", "vec2", "world-space shading normal facing the viewer, octahedral"),
     GBufferChannel("base_color", 4, "f2", "vec4", "scene-linear base colour; alpha holds F0, the specular reflectance"),
     GBufferChannel("material", 2, "f1", "vec2", "metallic, roughness"),
-    GBufferChannel("emission", 4, "f4", "vec4", "emitted radiance, W/(sr·m²)"),
+    GBufferChannel(
+        "emission", 4, "f2", "vec4", "emitted radiance, W/(sr·m²), over 2^alpha: one exponent for all three"
+    ),
     GBufferChannel("object_index", 1, "u2", "uint", "Blender's pass index"),
-    MOTION,
+    GBufferChannel("motion", 2, "f2", "vec2", "pixels moved since the previous frame, x right and y up"),
 )
+"""What the G-buffer holds of the nearest surface of every layer."""
+
+EXIT_CHANNELS = (
+    GBufferChannel(
+        "view_depth", 1, "f4", "float", "linear depth of the first back face behind, m; +inf where none", inf, "exit"
+    ),
+    GBufferChannel("normal", 2, "nu2", "vec2", "normal of the exit surface facing the viewer, octahedral", 0.0, "exit"),
+    GBufferChannel("base_color", 4, "f1", "vec4", "albedo of the exit surface", 0.0, "exit"),
+)
+"""What it holds of the surface where a ray that enters a layer leaves the solid behind it."""
 
 DEPTH_BYTES = 4
-"""The 32-bit float hardware depth buffer, shared by all layers."""
+"""One layer of the 32-bit float hardware depth array."""
 
 
-ORACLES = (TargetSpec("gbuffer.oracle_0", 1, "f4", 1, inf), TargetSpec("gbuffer.oracle_1", 1, "f4", 1, inf))
-"""View depth of the layer being drawn, and of the one before, which fragments are tested against; in turns."""
-
-
-def outputs_glsl(channels: tuple[GBufferChannel, ...], *, oracle: bool) -> str:
-    """GLSL fragment output declarations in attachment order: the channels that are written, then the oracle."""
-    outputs = [(channel.glsl_type, channel.name) for channel in channels] + [("float", "oracle")] * oracle
+def outputs_glsl(channels: tuple[GBufferChannel, ...]) -> str:
+    """GLSL fragment output declarations of the channels that are written, in attachment order."""
     return "".join(
-        f"layout(location = {index}) out {glsl_type} out_{name};\n" for index, (glsl_type, name) in enumerate(outputs)
+        f"layout(location = {index}) out {channel.glsl_type} out_{channel.name};\n"
+        for index, channel in enumerate(channels)
     )
+
+
+def channels_table() -> str:
+    """The README's table of what a pixel and layer may hold, as Markdown, and the sums of its bytes."""
+    rows = [channel.target(1) for channel in (*CHANNELS, *EXIT_CHANNELS)]
+    meanings = [channel.meaning for channel in (*CHANNELS, *EXIT_CHANNELS)]
+    lines = ["| target | format | bytes | holds |", "|---|---|---|---|"]
+    for row, meaning in zip(rows, meanings, strict=True):
+        texture_format = "RGBA"[: row.components] + _OPENGL_NAMES[row.dtype]
+        lines.append(f"| {row.name} | {texture_format} | {row.bytes_per_pixel} | {meaning} |")
+    surface = sum(row.bytes_per_pixel for row in rows[: len(CHANNELS)])
+    both = sum(row.bytes_per_pixel for row in rows)
+    sums = f"{surface} of every layer, {both} with its exit surface, {both + DEPTH_BYTES} with its hardware depth"
+    lines += ["", f"Bytes per pixel: {sums}."]
+    return "\n".join(lines) + "\n"

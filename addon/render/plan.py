@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which passes a scene needs, and why the others are left out. Pure: no OpenGL, no Blender."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from math import inf
 
-from ..scene import BaseColorSource, Channel, DebugView, LightKind, Material, RenderSettings, Scene
-from .layout import CHANNELS, ORACLES, GBufferChannel, TargetSpec
+from ..scene import BaseColorSource, Channel, DebugView, LightKind, Material, RenderSettings, Scene, Variant
+from .layout import CHANNELS, EXIT_CHANNELS, GBufferChannel, TargetSpec
 
 
 @dataclass(frozen=True)
@@ -29,13 +31,28 @@ class LeftOut:
 class Plan:
     """The passes of one sample in order, what was left out, and how the deep G-buffer is laid out.
 
-    `layers`: how many are built. `channels`: those that somebody reads.
+    `layers`: how many are built, by `variant`, which is TWO_PASS for a single one. `channels`: those that somebody
+    reads, each with how many layers of it, the nearest first. `look_ahead`: whether an extra layer shows the next
+    picture's depth. `guard_band`: pixels around the picture, on each side.
     """
 
     passes: tuple[PlannedPass, ...]
     left_out: tuple[LeftOut, ...]
     layers: int
-    channels: tuple[GBufferChannel, ...]
+    variant: Variant
+    channels: tuple[tuple[GBufferChannel, int], ...]
+    look_ahead: bool
+    guard_band: int
+
+    @property
+    def one_pass(self) -> bool:
+        """Whether one pass over the geometry reaches all layers."""
+        return self.variant is not Variant.TWO_PASS
+
+    @property
+    def drawn_layers(self) -> int:
+        """Layers that one pass over the geometry reaches; the targets it draws into have as many."""
+        return self.layers + self.look_ahead if self.one_pass else 1
 
     def find(self, name: str) -> PlannedPass | None:
         """The planned pass of that name, or None where it was left out."""
@@ -59,17 +76,21 @@ SUM_CHANNELS = (Channel.COMBINED, *sorted(MEAN_CHANNELS))
 
 def film_target(channel: Channel) -> TargetSpec:
     """The float32 RGBA target that the sum of a film image lives in."""
-    return TargetSpec(f"film.{channel.value.lower()}", 4, "f4")
+    return TargetSpec(f"film.{channel.value.lower()}", 4, "f4", guarded=False)
 
 
-_DEBUG_CHANNELS = {
-    DebugView.DEPTH: "view_depth",
-    DebugView.NORMAL: "normal",
-    DebugView.ALBEDO: "base_color",
-    DebugView.METALLIC: "material",
-    DebugView.ROUGHNESS: "material",
-    DebugView.EMISSION: "emission",
-    DebugView.OBJECT_INDEX: "object_index",
+_DEBUG_TARGETS = {
+    DebugView.DEPTH: "gbuffer.view_depth",
+    DebugView.NORMAL: "gbuffer.normal",
+    DebugView.ALBEDO: "gbuffer.base_color",
+    DebugView.METALLIC: "gbuffer.material",
+    DebugView.ROUGHNESS: "gbuffer.material",
+    DebugView.EMISSION: "gbuffer.emission",
+    DebugView.OBJECT_INDEX: "gbuffer.object_index",
+    DebugView.MOTION: "gbuffer.motion",
+    DebugView.EXIT_DEPTH: "exit.view_depth",
+    DebugView.EXIT_NORMAL: "exit.normal",
+    DebugView.EXIT_ALBEDO: "exit.base_color",
 }
 
 _FILM_CHANNELS = {
@@ -81,19 +102,44 @@ _FILM_CHANNELS = {
 }
 
 
-def plan(scene: Scene, settings: RenderSettings) -> Plan:
-    """Decide the passes for one scene and one set of settings."""
+def plan(scene: Scene, settings: RenderSettings, *, continuous: bool = False) -> Plan:
+    """Decide the passes for one scene and one set of settings; `continuous` as in `Sequence`."""
     left_out: list[LeftOut] = []
     layers = _layer_count(settings, left_out)
+    variant = settings.variant if layers > 1 else Variant.TWO_PASS
+    look_ahead = _looks_ahead(variant, settings, continuous=continuous)
+    guard_band = _plan_guard_band(settings, variant, left_out)
     direct = _plan_direct(scene, settings, layers, left_out)
-    channels = _read_channels(scene, settings, direct, left_out)
+    channels = _read_channels(scene, settings, direct, layers, left_out)
+    one_pass = variant is not Variant.TWO_PASS
     gbuffer = PlannedPass(
         "gbuffer",
-        writes=tuple(channel.target(layers) for channel in channels) + (ORACLES if layers > 1 else ()),
-        defines=frozenset({"PEEL"} if layers > 1 else ()),
+        reads=("gbuffer.oracle",) if layers > 1 else (),
+        # One pass over the geometry writes every channel in every layer it reaches.
+        writes=(
+            *(channel.target(layers + look_ahead if one_pass else read) for channel, read in channels),
+            *((TargetSpec(ORACLE_TARGET, 1, "f4", 1, inf),) if layers > 1 and not one_pass else ()),
+        ),
     )
-    passes = (gbuffer, *((direct,) if direct else ()), _plan_composite(scene, settings, direct))
-    return Plan(passes, tuple(left_out), layers, channels)
+    passes = [
+        *_plan_oracle(variant, layers, left_out),
+        gbuffer,
+        *_plan_exit(settings, layers + look_ahead if one_pass else layers, left_out),
+        *((direct,) if direct else ()),
+        _plan_composite(scene, settings, direct),
+    ]
+    return Plan(tuple(passes), tuple(left_out), layers, variant, channels, look_ahead, guard_band)
+
+
+def frames_before(settings: RenderSettings) -> int:
+    """How many frames before the rendered one the settings need (`Sequence.previous`, then `Sequence.earlier`)."""
+    if _layer_count(settings, []) > 1:
+        if settings.variant is Variant.PREDICT:
+            return 2
+        if settings.variant in (Variant.PREVIOUS, Variant.REPROJECT):
+            return 1
+    reads_motion = settings.debug_view is DebugView.MOTION or (settings.deep_output and settings.motion_vectors)
+    return 1 if reads_motion else 0
 
 
 def is_emissive(material: Material) -> bool:
@@ -116,9 +162,9 @@ def is_alpha_tested(material: Material) -> bool:
     return material.texture_alpha and material.source is BaseColorSource.TEXTURE
 
 
-def is_invisible(material: Material, settings: RenderSettings) -> bool:
+def is_invisible(material: Material, alpha_threshold: float) -> bool:
     """Whether no fragment of the material can pass the alpha test."""
-    return material.alpha < settings.alpha_threshold
+    return material.alpha < alpha_threshold
 
 
 def _layer_count(settings: RenderSettings, left_out: list[LeftOut]) -> int:
@@ -135,6 +181,56 @@ def _layer_count(settings: RenderSettings, left_out: list[LeftOut]) -> int:
         if needed == 1:
             left_out.append(LeftOut("minimum separation", "Δz unused: only one layer is built"))
     return needed
+
+
+ORACLE_TARGET = "gbuffer.oracle"
+"""View depth of the layers that the next ones are tested against."""
+
+ORACLE_SCRATCH = "gbuffer.oracle_scratch"
+"""A layer of the oracle while it is drawn: OpenGL 4.1 forbids reading any layer of an attached array."""
+
+
+def _looks_ahead(variant: Variant, settings: RenderSettings, *, continuous: bool) -> bool:
+    """Whether a picture's pass draws the oracle of the next picture, if any comes."""
+    if variant is Variant.DELAY:
+        return continuous or settings.samples > 1
+    return variant is Variant.PREDICT and continuous
+
+
+def _plan_oracle(variant: Variant, layers: int, left_out: list[LeftOut]) -> tuple[PlannedPass, ...]:
+    if layers == 1:
+        left_out.append(LeftOut("oracle", "only one layer is built"))
+        return ()
+    if variant is Variant.TWO_PASS:
+        left_out.append(LeftOut("oracle", "Two-Pass draws each layer before the next one is tested against it"))
+        return ()
+    scratch = (TargetSpec(ORACLE_SCRATCH, 1, "f4", 1, inf),) if layers > 2 else ()
+    return (PlannedPass("oracle", writes=(TargetSpec(ORACLE_TARGET, 1, "f4", layers - 1, inf), *scratch)),)
+
+
+def _plan_guard_band(settings: RenderSettings, variant: Variant, left_out: list[LeftOut]) -> int:
+    if settings.guard_band == 0 or variant is Variant.REPROJECT:
+        return settings.guard_band
+    reason = "nothing reads beyond the picture's edge: no screen-space effect, no layers that are reprojected"
+    left_out.append(LeftOut("guard band", reason))
+    return 0
+
+
+def _debug_target(settings: RenderSettings) -> str:
+    """The target that the debug view shows; empty where it shows none of the geometry's."""
+    return _DEBUG_TARGETS.get(settings.debug_view, "")
+
+
+def _reads_exit(settings: RenderSettings) -> bool:
+    return (settings.deep_output and settings.exit_surfaces) or _debug_target(settings).startswith("exit.")
+
+
+def _plan_exit(settings: RenderSettings, layers: int, left_out: list[LeftOut]) -> tuple[PlannedPass, ...]:
+    if not _reads_exit(settings):
+        left_out.append(LeftOut("exit", "no effect, output or debug view reads the exit surfaces"))
+        return ()
+    writes = tuple(channel.target(layers) for channel in EXIT_CHANNELS)
+    return (PlannedPass("exit", reads=("gbuffer.view_depth",), writes=writes),)
 
 
 def _plan_direct(scene: Scene, settings: RenderSettings, layers: int, left_out: list[LeftOut]) -> PlannedPass | None:
@@ -196,25 +292,34 @@ def _direct_needs(scene: Scene) -> dict[str, tuple[bool, str]]:
 
 
 def _read_channels(
-    scene: Scene, settings: RenderSettings, direct: PlannedPass | None, left_out: list[LeftOut]
-) -> tuple[GBufferChannel, ...]:
-    read = {"view_depth"}
+    scene: Scene, settings: RenderSettings, direct: PlannedPass | None, layers: int, left_out: list[LeftOut]
+) -> tuple[tuple[GBufferChannel, int], ...]:
+    """The channels that somebody reads, each with how many layers of it."""
+    read = {"view_depth": layers}
+
+    def add(names: Iterable[str], count: int) -> None:
+        for name in names:
+            read[name] = max(read.get(name, 0), count)
+
     if direct:
-        read |= {name.removeprefix("gbuffer.") for name in direct.reads}
+        add((name.removeprefix("gbuffer.") for name in direct.reads), layers)
     for channel in settings.channels:
-        read |= _FILM_CHANNELS.get(channel, set())
-    if settings.debug_view in _DEBUG_CHANNELS:
-        read.add(_DEBUG_CHANNELS[settings.debug_view])
+        add(_FILM_CHANNELS.get(channel, ()), 1)
+    if _debug_target(settings).startswith("gbuffer."):
+        add((_debug_target(settings).removeprefix("gbuffer."),), min(settings.debug_layer + 1, layers))
     if settings.deep_output:
-        read |= {"normal", "base_color", "material", "object_index"}
+        add(("normal", "base_color", "material", "object_index"), layers)
         if any(is_emissive(material) for material in scene.materials.values()):
-            read.add("emission")
-    left_out += [
-        LeftOut(f"gbuffer {channel.name}", "no pass or output reads it")
-        for channel in CHANNELS
-        if channel.name not in read
-    ]
-    return tuple(channel for channel in CHANNELS if channel.name in read)
+            add(("emission",), layers)
+        if settings.motion_vectors:
+            add(("motion",), layers)
+    for channel in CHANNELS:
+        if channel.name not in read:
+            left_out.append(LeftOut(f"gbuffer {channel.name}", "no pass or output reads it"))
+        elif read[channel.name] < layers and settings.variant is Variant.TWO_PASS:
+            reason = "no pass or output reads it there"
+            left_out.append(LeftOut(f"gbuffer {channel.name} behind layer {read[channel.name]}", reason))
+    return tuple((channel, read[channel.name]) for channel in CHANNELS if channel.name in read)
 
 
 def _plan_composite(scene: Scene, settings: RenderSettings, direct: PlannedPass | None) -> PlannedPass:
@@ -229,9 +334,9 @@ def _plan_composite(scene: Scene, settings: RenderSettings, direct: PlannedPass 
     if Channel.DIFFUSE_COLOR in settings.channels and has_glossy(scene):
         defines.add("SPECULAR")
     reads = {"view_depth"}.union(*(_FILM_CHANNELS[channel] for channel in settings.channels & MEAN_CHANNELS))
-    if settings.debug_view in _DEBUG_CHANNELS:
-        reads.add(_DEBUG_CHANNELS[settings.debug_view])
     targets = [f"gbuffer.{name}" for name in sorted(reads)]
+    if _debug_target(settings) and _debug_target(settings) not in targets:
+        targets.append(_debug_target(settings))
     if defines & {"DIRECT", "DEBUG_DIRECT"}:
         targets.append("direct.radiance")
     writes = tuple(

@@ -13,7 +13,10 @@ from .uniforms import UniformBlock
 
 GLSL_VERSION = "#version 410 core"
 
+_MODERNGL_STAGES = {"vert": "vertex_shader", "geom": "geometry_shader", "frag": "fragment_shader"}
+
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
+_IDENTIFIER = re.compile(r"[A-Za-z_]\w*")
 # Mesa and Apple write "source:line", NVIDIA "source(line)".
 _LOCATION = re.compile(r"(?<![\w.])(\d+):(\d+)|(?<![\w.])(\d+)\((\d+)\)")
 
@@ -33,17 +36,25 @@ def shader_root() -> Path:
 class ProgramSpec:
     """A program variant: equal values compile once.
 
-    `vertex`, `fragment`: paths below `shaders/`. `defines`: names, or "NAME value" pairs. `blocks`: uniform blocks,
-    bound to binding points 0, 1, … in order. `samplers`: sampler uniform names, bound to units 0, 1, … in order.
+    `vertex`, `geometry` (None for no such stage), `fragment`: paths below `shaders/`. `defines`: names, or
+    "NAME value" pairs. `blocks`: uniform blocks, bound to binding points 0, 1, … in order. `samplers`: sampler uniform
+    names, bound to units 0, 1, … in order.
     `generated`: (include name, GLSL text) pairs for `#include "generated/NAME.glsl"`; every block is one as well.
     """
 
     vertex: str
     fragment: str
     defines: frozenset[str] = frozenset()
+    geometry: str | None = None
     blocks: tuple[UniformBlock, ...] = ()
     samplers: tuple[str, ...] = ()
     generated: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def stages(self) -> tuple[tuple[str, str], ...]:
+        """(stage, path) of every stage; stages are named as glslangValidator names them."""
+        geometry = (("geom", self.geometry),) if self.geometry else ()
+        return (("vert", self.vertex), *geometry, ("frag", self.fragment))
 
     @property
     def name(self) -> str:
@@ -91,12 +102,17 @@ class _Expansion:
 
 
 def expand(path: str, spec: ProgramSpec) -> ExpandedSource:
-    """One stage's full source: version, defines, then the file with its includes. Raises ShaderError."""
+    """One stage's full source: version, the defines that it mentions, then the file with its includes.
+
+    Raises ShaderError.
+    """
     generated = {block.name: block.glsl for block in spec.blocks} | dict(spec.generated)
     expansion = _Expansion(generated)
     expansion.add(path)
-    header = [GLSL_VERSION, *(f"#define {define}" for define in sorted(spec.defines))]
-    return ExpandedSource("\n".join([*header, *expansion.lines, ""]), tuple(expansion.files))
+    text = "\n".join([*expansion.lines, ""])
+    mentioned = set(_IDENTIFIER.findall(text))
+    defines = [f"#define {define}\n" for define in sorted(spec.defines) if define.split()[0] in mentioned]
+    return ExpandedSource("".join([GLSL_VERSION, "\n", *defines, text]), tuple(expansion.files))
 
 
 def name_files(log: str, files: tuple[str, ...]) -> str:
@@ -130,12 +146,16 @@ class ProgramLibrary:
         self._programs.clear()
 
     def _compile(self, spec: ProgramSpec) -> moderngl.Program:
-        vertex, fragment = expand(spec.vertex, spec), expand(spec.fragment, spec)
+        sources = {_MODERNGL_STAGES[stage]: expand(path, spec) for stage, path in spec.stages}
         try:
-            program = self._context.program(vertex_shader=vertex.text, fragment_shader=fragment.text)
+            program = self._context.program(
+                vertex_shader=sources["vertex_shader"].text,
+                geometry_shader=sources["geometry_shader"].text if spec.geometry else None,
+                fragment_shader=sources["fragment_shader"].text,
+            )
         except moderngl.Error as error:
-            files = vertex.files if "vertex_shader" in str(error) else fragment.files
-            raise ShaderError(f"{spec.name}: {name_files(str(error), files)}") from error
+            failed = next((stage for stage in sources if stage in str(error)), "fragment_shader")
+            raise ShaderError(f"{spec.name}: {name_files(str(error), sources[failed].files)}") from error
         for binding, block in enumerate(spec.blocks):
             if block.name in program:  # the compiler drops blocks that a variant does not read
                 program[block.name].binding = binding  # pyright: ignore[reportAttributeAccessIssue]
@@ -151,7 +171,7 @@ def all_variants() -> Iterator[tuple[str, str, ExpandedSource]]:
 
     seen: set[str] = set()
     for spec in (spec for render_pass in PASSES for spec in render_pass.variants()):
-        for stage, path in (("vert", spec.vertex), ("frag", spec.fragment)):
+        for stage, path in spec.stages:
             source = expand(path, spec)
             if source.text not in seen:
                 seen.add(source.text)

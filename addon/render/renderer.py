@@ -5,17 +5,22 @@ import time
 
 import numpy as np
 
-from ..scene import Camera, Channel, RenderSettings, Scene
+from ..scene import Camera, Channel, Layering, Moment, RenderSettings, Scene, Sequence
 from ..scene.arrays import Float32Array
+from ..scene.correspondence import Correspondence
 from .device import Device
+from .draws import DrawLists
 from .film import Film
 from .geometry import GeometryStore
 from .images import ImageStore
-from .passes import PASSES, Frame, GBufferPass, Pass
+from .layering import Trial, calibration_view, resolved
+from .oracle_state import OracleState
+from .passes import PASSES, Frame, Pass
 from .plan import FIRST_SAMPLE_CHANNELS, Plan, plan
 from .readback import EMPTY_DEPTH, LayerImages, positions, read_layers, read_target
 from .sampling import film_sample
 from .statistics import PassTimers, RenderStatistics
+from .surroundings import oracle_depends_on, surroundings
 from .targets import TexturePool
 
 
@@ -26,7 +31,10 @@ class Renderer:
         self._device = device
         self._pool = TexturePool(device)
         self._geometry = GeometryStore(device)
+        self._draws = DrawLists(device)
+        self._correspondences: list[tuple[Scene, Correspondence]] = []
         self._images = ImageStore(device)
+        self._oracle = OracleState()
         self._film = Film(device)
         self._timers = PassTimers(device)
         self._passes: dict[str, Pass] = {}
@@ -37,48 +45,65 @@ class Renderer:
         self._upload_seconds = 0.0
         self._warnings: tuple[str, ...] = ()
 
-    def begin(self, scene: Scene, camera: Camera, settings: RenderSettings) -> Plan:
+    def begin(self, scene: Scene, camera: Camera, settings: RenderSettings, sequence: Sequence | None = None) -> Plan:
         """Upload what changed since the last call, plan, allocate, and start an empty film.
 
-        Raises RenderError where the device cannot hold the targets, ShaderError where a shader is broken.
+        `sequence`: the frames around this one; without it nothing is known of others.
+
+        Raises RenderError where the device cannot hold the targets.
         """
         self._frame = None
-        start = time.perf_counter()
-        self._geometry.update(scene)
-        self._warnings = tuple(self._images.update(scene))
-        self._upload_seconds = time.perf_counter() - start
-        planned = plan(scene, settings)
-        self._pool.prepare((settings.width, settings.height), planned.targets)
+        sequence = sequence or Sequence()
+        planned = plan(scene, settings, continuous=sequence.continuous)
+        self._pool.prepare(
+            (settings.width, settings.height),
+            planned.targets,
+            guard_band=planned.guard_band,
+            depth_layers=planned.drawn_layers,
+        )
+        frames = surroundings(Moment(scene, camera), sequence, planned, settings)
+        self._upload(scene, frames.history.scene if frames.history else scene, settings.alpha_threshold)
+        self._oracle.begin(oracle_depends_on(settings, planned), continuous=sequence.continuous)
         self._film.samples = 0
         self._first_sample, self._layers = {}, ()
         self._camera = camera
-        sample = film_sample(0, settings.filter_radius, settings.seed)
         self._frame = Frame(
-            self._device,
-            self._pool,
-            self._geometry,
-            self._images,
-            self._film,
-            scene,
-            settings,
-            planned,
-            camera,
-            sample,
+            device=self._device,
+            pool=self._pool,
+            geometry=self._geometry,
+            draws=self._draws,
+            images=self._images,
+            film=self._film,
+            oracle=self._oracle,
+            correspondence=self._correspondence,
+            scene=scene,
+            settings=settings,
+            plan=planned,
+            layering=self._layering(settings, planned),
+            view=frames.view,
+            camera=frames.view,
+            sample=film_sample(0, settings.filter_radius, settings.seed),
+            previous=frames.previous,
+            history=frames.history,
+            ahead=frames.ahead,
+            continuous=sequence.continuous,
         )
         self._prepare_passes(self._frame)
         return planned
 
     def render_sample(self) -> int:
-        """Render one more sample into the film; returns how many it holds."""
-        frame, camera = self._require_frame()
-        frame.sample = film_sample(self._film.samples, frame.settings.filter_radius, frame.settings.seed)
-        offset_x, offset_y = frame.sample.pixel_offset
-        frame.camera = camera.shifted(offset_x / frame.settings.width, offset_y / frame.settings.height)
+        """Render one more sample into the film; returns how many it holds.
+
+        Raises ShaderError where a shader is broken, RenderError where the driver lacks what the settings ask for.
+        """
+        frame = self._require_frame()
+        frame.begin_sample(film_sample(self._film.samples, frame.settings.filter_radius, frame.settings.seed))
         for planned in frame.plan.passes:
             with self._timers.measure(planned.name):
                 self._passes[planned.name].run(frame, planned)
         if frame.sample.index == 0:
-            self._keep_first_sample(frame)
+            assert self._camera is not None
+            self._keep_first_sample(frame, self._camera)
         self._film.samples += 1
         return self._film.samples
 
@@ -100,18 +125,19 @@ class Renderer:
 
     def statistics(self) -> RenderStatistics:
         """What the last `begin` and sample did; waits for the GPU."""
-        frame, _ = self._require_frame()
-        gbuffer = self._passes["gbuffer"]
-        assert isinstance(gbuffer, GBufferPass)
+        frame = self._require_frame()
+        draws = self._draws.of(frame.scene)
         sizes = self._pool.bytes()
+        if self._pool.guard_band:
+            sizes["of these, guard band"] = self._pool.guard_band_bytes()
         sizes["geometry"] = self._geometry.bytes()
         sizes["images"] = self._images.bytes()
         return RenderStatistics(
             upload_s=self._upload_seconds,
             passes=self._timers.milliseconds(),
             left_out=tuple((left.name, left.reason) for left in frame.plan.left_out),
-            triangles=gbuffer.triangles,
-            draws=gbuffer.draws,
+            triangles=draws.triangles,
+            draws=len(draws.draws),
             instances=sum(batch.count for batch in frame.scene.batches),
             bytes=sizes,
             warnings=self._warnings,
@@ -123,11 +149,52 @@ class Renderer:
         for render_pass in self._passes.values():
             render_pass.release()
         self._passes.clear()
+        self._draws.release()
         self._images.release()
         self._geometry.release()
         self._pool.release()
+        self._oracle.forget()
+        self._correspondences.clear()
         self._timers.forget()
         self._frame = None
+
+    def _upload(self, scene: Scene, history: Scene, alpha_threshold: float) -> None:
+        """Bring what is drawn to the GPU: the scene, and the one that its oracle is drawn from."""
+        start = time.perf_counter()
+        scenes = [scene] if history is scene else [scene, history]
+        self._geometry.update(scenes)
+        self._warnings = tuple(self._images.update({**history.images, **scene.images}))
+        self._draws.prepare(scenes, alpha_threshold)
+        self._upload_seconds = time.perf_counter() - start
+
+    def _correspondence(self, other: Scene) -> Correspondence:
+        """What of the view's scenes is what of another; those of the last few scenes are kept."""
+        for scene, correspondence in self._correspondences:
+            if scene is other:
+                return correspondence
+        self._correspondences = [(other, Correspondence(other)), *self._correspondences[:2]]
+        return self._correspondences[0][1]
+
+    def _layering(self, settings: RenderSettings, planned: Plan) -> Layering:
+        """How one pass reaches several layers; Two-Pass needs nothing of the kind and measures nothing."""
+        if settings.layering is Layering.FASTEST and not planned.one_pass:
+            return Layering.VERTEX_SHADER
+        return resolved(settings, self._device, self._try_layering)
+
+    def _try_layering(self, settings: RenderSettings) -> Trial:
+        """Render the calibration view in a renderer of its own."""
+        renderer = Renderer(self._device)
+        try:
+            renderer.begin(*calibration_view(), settings)
+            times: list[float] = []
+            for _ in range(settings.samples):
+                renderer.render_sample()
+                times.append(dict(renderer.statistics().passes)["gbuffer"])
+            layers = [renderer.read_layer(layer) for layer in range(settings.layers)]
+            bits = b"".join(image.tobytes() for item in layers for image in (item.depth, item.normal))
+            return Trial(min(times[1:]), bits)
+        finally:
+            renderer.release()
 
     def _prepare_passes(self, frame: Frame) -> None:
         wanted = {planned.name for planned in frame.plan.passes}
@@ -140,7 +207,8 @@ class Renderer:
                 self._passes[planned.name] = kinds[planned.name](self._device)
             self._passes[planned.name].prepare(frame, planned)
 
-    def _keep_first_sample(self, frame: Frame) -> None:
+    def _keep_first_sample(self, frame: Frame, camera: Camera) -> None:
+        """Read what is not a mean over samples; `camera` is the picture's, without guard band."""
         wanted = frame.settings.channels & FIRST_SAMPLE_CHANNELS
         if wanted:
             depth = read_target(self._pool, "gbuffer.view_depth")[0, ..., 0]
@@ -148,13 +216,15 @@ class Renderer:
             if Channel.DEPTH in wanted:
                 self._first_sample[Channel.DEPTH] = np.where(covered, depth, EMPTY_DEPTH)[..., None]
             if Channel.POSITION in wanted:
-                self._first_sample[Channel.POSITION] = positions(depth, frame.camera)
+                self._first_sample[Channel.POSITION] = positions(depth, camera)
             if Channel.OBJECT_INDEX in wanted:
                 self._first_sample[Channel.OBJECT_INDEX] = read_target(self._pool, "gbuffer.object_index")[0]
         if frame.settings.deep_output:
-            self._layers = read_layers(self._pool, frozenset(target.name for target in frame.plan.targets))
+            self._layers = read_layers(
+                self._pool, frozenset(target.name for target in frame.plan.targets), frame.plan.layers
+            )
 
-    def _require_frame(self) -> tuple[Frame, Camera]:
-        if self._frame is None or self._camera is None:
+    def _require_frame(self) -> Frame:
+        if self._frame is None:
             raise RuntimeError("begin() has not been called, or failed")
-        return self._frame, self._camera
+        return self._frame

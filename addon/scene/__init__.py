@@ -10,7 +10,8 @@ from .geometry import InstanceBatch, Mesh, SlotRange
 from .lights import AreaShape, Light, LightKind
 from .materials import BaseColorSource, Extension, Image, ImageTexture, Interpolation, Material
 from .scene import Scene, Versions, World
-from .settings import Channel, DebugView, RenderSettings
+from .sequence import Moment, Sequence
+from .settings import Channel, DebugView, Layering, RenderSettings, Variant
 
 __all__ = [
     "AreaShape",
@@ -23,13 +24,17 @@ __all__ = [
     "ImageTexture",
     "InstanceBatch",
     "Interpolation",
+    "Layering",
     "Light",
     "LightKind",
     "Material",
     "Mesh",
+    "Moment",
     "RenderSettings",
     "Scene",
+    "Sequence",
     "SlotRange",
+    "Variant",
     "Versions",
     "World",
 ]

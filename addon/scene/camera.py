@@ -35,6 +35,13 @@ class Camera:
         """(3, 3) float64 world-from-camera rotation; columns are the camera's axes in world space."""
         return self.world_from_camera[:3, :3]
 
+    def sees_as(self, other: "Camera") -> bool:
+        """Whether both make the very same picture."""
+        return np.array_equal(self.world_from_camera, other.world_from_camera) and (
+            (self.window, self.clip_start, self.clip_end, self.orthographic)
+            == (other.window, other.clip_start, other.clip_end, other.orthographic)
+        )
+
     def cropped(self, left: float, right: float, bottom: float, top: float) -> "Camera":
         """The same camera seeing only a rectangle of its image, in fractions 0…1 of the full window."""
         window_left, window_right, window_bottom, window_top = self.window

@@ -2,6 +2,9 @@
 """Triangle meshes and where they are placed."""
 
 from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
 
 from .arrays import Float32Array, Float64Array, Int32Array, Int64Array, UInt32Array
 
@@ -24,6 +27,7 @@ class Mesh:
     `uvs` (V, 2) float32 of the first UV map, or None. `colors` (V, 4) float32 scene-linear, or None.
     `triangles` (T, 3) uint32 rows of `positions`, counter-clockwise from the front, grouped by slot.
     `slots` ranges in ascending order that together cover `triangles`.
+    `velocities` (V, 3) float32, metres per frame in object space, or None where nobody knows them.
     `version` differs whenever any array differs from that of an earlier mesh with the same `key`.
     """
 
@@ -36,6 +40,15 @@ class Mesh:
     slots: tuple[SlotRange, ...]
     uvs: Float32Array | None = None
     colors: Float32Array | None = None
+    velocities: Float32Array | None = None
+
+    @cached_property
+    def bounds(self) -> Float64Array:
+        """(2, 3) float64: lowest and highest corner of the box around `positions`; zero where there are none."""
+        if len(self.positions) == 0:
+            return np.zeros((2, 3))
+        axes = self.positions.T  # one by one, which is several times faster than row by row
+        return np.array([[axis.min() for axis in axes], [axis.max() for axis in axes]], np.float64)
 
 
 @dataclass(frozen=True)

@@ -22,12 +22,10 @@ def render_camera(depsgraph: bpy.types.Depsgraph, resolution_x: int, resolution_
     Shift, sensor fit and the scene's pixel aspect are in the window. A panoramic or custom camera
     is shown in perspective (`camera_messages` says so).
     """
+    camera = _active_camera(depsgraph)
+    if camera is None or camera.type != "CAMERA":
+        return None
     scene: Any = depsgraph.scene_eval
-    if scene.camera is None:
-        return None
-    camera = scene.camera.evaluated_get(depsgraph)
-    if camera.type != "CAMERA":
-        return None
     projection = _matrix(
         camera.calc_matrix_camera(
             depsgraph,
@@ -49,8 +47,7 @@ def render_camera(depsgraph: bpy.types.Depsgraph, resolution_x: int, resolution_
 
 def camera_messages(depsgraph: bpy.types.Depsgraph, messages: Messages) -> None:
     """Report what about the scene's camera cannot be shown."""
-    scene: Any = depsgraph.scene_eval
-    camera = scene.camera
+    camera = _active_camera(depsgraph)
     if camera is None:
         return
     if camera.type != "CAMERA":
@@ -59,6 +56,15 @@ def camera_messages(depsgraph: bpy.types.Depsgraph, messages: Messages) -> None:
         kind = {"PANO": "panoramic"}.get(camera.data.type, camera.data.type.lower())
         text = f"Camera “{camera.name}” is {kind}, which is not rendered yet; perspective is used instead."
         messages.add("camera", "type", text)
+
+
+def _active_camera(depsgraph: bpy.types.Depsgraph) -> Any:
+    """The scene's active camera, evaluated, or None.
+
+    The evaluated scene would still name the one before where a marker switched it in `RenderEngine.frame_set`.
+    """
+    scene: Any = depsgraph.scene
+    return scene.camera and scene.camera.evaluated_get(depsgraph)
 
 
 def viewport_camera(
@@ -87,8 +93,7 @@ def _clip_source(
     """Whoever's `clip_start` and `clip_end` hold; a projection matrix has them only roughly."""
     if region_3d.view_perspective != "CAMERA":
         return space
-    scene: Any = depsgraph.scene_eval
-    camera = space.camera if space.use_local_camera else scene.camera
+    camera = space.camera if space.use_local_camera else _active_camera(depsgraph)
     if camera is None or camera.type != "CAMERA":
         return space
     return camera.evaluated_get(depsgraph).data

@@ -8,28 +8,13 @@ from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..scene import InstanceBatch, Light, Scene
+from ..scene.arrays import same_array
 from ..scene.versions import new_version
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
-
-
-def same_array(first: NDArray[np.generic] | None, second: NDArray[np.generic] | None) -> bool:
-    """Whether two arrays (or Nones) hold the same bits: NaN equals itself, so broken data is not "changed" forever.
-
-    Compared as integers, which is also faster than as floats.
-    """
-    if first is None or second is None:
-        return first is second
-    if first is second:
-        return True
-    if first.shape != second.shape or first.dtype != second.dtype:
-        return False
-    bits = np.dtype(f"u{first.dtype.itemsize}")
-    return bool(np.array_equal(first.view(bits), second.view(bits)))
 
 
 def same_fields(first: DataclassInstance | None, second: DataclassInstance | None) -> bool:

@@ -14,13 +14,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..scene import Mesh, SlotRange
-from ..scene.arrays import BoolArray, Float32Array, Int32Array, UInt32Array
-from .changes import new_version, same_array
+from ..scene.arrays import BoolArray, Float32Array, Int32Array, UInt32Array, same_array
+from .changes import new_version
 
 if TYPE_CHECKING:
     import bpy
 
 _AREA_CHUNK = 32768
+_MOVING = {"positions", "normals", "velocities"}
+"""What may differ in a mesh that merely moves."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,7 @@ class RawMesh:
     `positions` (P, 3) float32. `corner_points` (C,) int32. `triangle_corners` (T, 3) int32.
     `normals` float32: (P, 3) if `by_points`, else (C, 3). `triangle_slots` (T,) int32 or None where all are 0.
     `uvs` (C, 2) float32. `colors` float32: (P, 4) if `by_points`, else (C, 4).
+    `velocities` (P, 3) float32, metres per frame.
     """
 
     by_points: bool
@@ -40,6 +43,7 @@ class RawMesh:
     triangle_slots: Int32Array | None
     uvs: Float32Array | None
     colors: Float32Array | None
+    velocities: Float32Array | None
 
     def changed_fields(self, other: RawMesh) -> set[str]:
         """Names of the arrays that differ."""
@@ -61,23 +65,29 @@ class MeshRecord:
 
 
 def update_mesh(
-    key: str, name: str, mesh: bpy.types.Mesh, colour_attribute: str | None, previous: MeshRecord | None
+    key: str,
+    name: str,
+    mesh: bpy.types.Mesh,
+    colour_attribute: str | None,
+    frames_per_second: float,
+    previous: MeshRecord | None,
 ) -> MeshRecord:
     """The record of an evaluated mesh: `previous` itself where nothing changed, whatever `name` is by now.
 
     `colour_attribute` names the one that the object's materials read; None takes the mesh's own choice.
+    `frames_per_second` turns Blender's velocities, per second, into those of the scene.
     """
-    raw = _read(mesh, colour_attribute)
+    raw = _read(mesh, colour_attribute, frames_per_second)
     if previous is not None:
         changed = raw.changed_fields(previous.raw)
         if not changed:
             return previous
-        if changed <= {"positions", "normals"} and not previous.warnings and np.isfinite(raw.positions).all():
+        if changed <= _MOVING and not previous.warnings and np.isfinite(raw.positions).all():
             return MeshRecord(raw, _moved(raw, previous.mesh), ())
     return _build(key, name, raw)
 
 
-def _read(mesh: bpy.types.Mesh, colour_attribute: str | None) -> RawMesh:
+def _read(mesh: bpy.types.Mesh, colour_attribute: str | None, frames_per_second: float) -> RawMesh:
     uvs = _read_uvs(mesh)
     attribute = _find_colour_attribute(mesh, colour_attribute)
     by_points = mesh.normals_domain == "POINT" and uvs is None and (attribute is None or attribute.domain == "POINT")
@@ -99,6 +109,7 @@ def _read(mesh: bpy.types.Mesh, colour_attribute: str | None) -> RawMesh:
         triangle_slots=_read_triangle_slots(mesh),
         uvs=uvs,
         colors=colors,
+        velocities=_read_velocities(mesh, frames_per_second),
     )
 
 
@@ -135,6 +146,16 @@ def _read_colors(attribute: Any, corner_points: Int32Array, by_points: bool) -> 
     return colors[corner_points] if attribute.domain == "POINT" and not by_points else colors
 
 
+def _read_velocities(mesh: bpy.types.Mesh, frames_per_second: float) -> Float32Array | None:
+    """Per frame, from the attribute that simulations and caches write, per second; None where it is something else."""
+    attribute: Any = mesh.attributes.get("velocity")
+    if attribute is None or attribute.domain != "POINT" or attribute.data_type != "FLOAT_VECTOR":
+        return None
+    velocities = _read_attribute(mesh, "velocity", "vector", np.float32, len(mesh.vertices) * 3).reshape(-1, 3)
+    velocities /= np.float32(frames_per_second)
+    return velocities
+
+
 def _read_triangle_slots(mesh: bpy.types.Mesh) -> Int32Array | None:
     if "material_index" not in mesh.attributes:
         return None
@@ -169,7 +190,7 @@ def _read_triangle_corners(mesh: bpy.types.Mesh) -> Int32Array:
 
 
 def _moved(raw: RawMesh, previous: Mesh) -> Mesh:
-    """`previous` with new positions and normals; everything else stays the very same array."""
+    """`previous` with new positions, normals and velocities; everything else stays the very same array."""
     return Mesh(
         key=previous.key,
         name=previous.name,
@@ -180,6 +201,7 @@ def _moved(raw: RawMesh, previous: Mesh) -> Mesh:
         slots=previous.slots,
         uvs=previous.uvs,
         colors=previous.colors,
+        velocities=_velocities(raw),
     )
 
 
@@ -210,8 +232,16 @@ def _build(key: str, name: str, raw: RawMesh) -> MeshRecord:
         slots=ranges,
         uvs=None if raw.uvs is None else _finite_or_zero(raw.uvs),
         colors=None if raw.colors is None else _finite_or_zero(raw.colors),
+        velocities=_velocities(raw),
     )
     return MeshRecord(raw, mesh, tuple(warnings))
+
+
+def _velocities(raw: RawMesh) -> Float32Array | None:
+    """Velocities of the mesh's vertices, finite."""
+    if raw.velocities is None:
+        return None
+    return _finite_or_zero(raw.velocities if raw.by_points else raw.velocities[raw.corner_points])
 
 
 def _finite_or_zero(values: Float32Array) -> Float32Array:

@@ -113,6 +113,8 @@ class _Gathering:
         self._messages = messages
         view_layer: Any = depsgraph.view_layer_eval
         self._override = view_layer.material_override
+        blender_scene: Any = depsgraph.scene_eval
+        self._frames_per_second = blender_scene.render.fps / blender_scene.render.fps_base
         self._visibility = Visibility(depsgraph, space, messages)
         self._matrices = read_matrices(depsgraph)
         self._drawn: dict[tuple[int, int], tuple[Placements, int] | None] = {}
@@ -176,7 +178,8 @@ class _Gathering:
         materials = tuple(material.key for material in slots)
         key, name = self._mesh_keys.key(shown)
         if key not in self.meshes:
-            self.meshes[key] = update_mesh(key, shown.name, mesh, attribute, self._previous.get(key))
+            previous = self._previous.get(key)
+            self.meshes[key] = update_mesh(key, shown.name, mesh, attribute, self._frames_per_second, previous)
             self._messages.extend(key, self.meshes[key].warnings)
         if not self.meshes[key].mesh.slots:
             return None

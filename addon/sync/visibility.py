@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..scene import InstanceBatch, Scene
-from ..scene.arrays import BoolArray
-from .changes import Messages, new_version, same_array, with_versions
+from ..scene.arrays import BoolArray, same_array
+from .changes import Messages, new_version, with_versions
 
 if TYPE_CHECKING:
     import bpy

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Builds small Blender scenes and mirrors them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import bpy
@@ -41,6 +41,29 @@ def make_mesh(name: str, vertices: Sequence, faces: Sequence) -> bpy.types.Mesh:
 def make_object(name: str = "Thing", vertices: Sequence = TETRAHEDRON[0], faces: Sequence = TETRAHEDRON[1]):
     """A linked mesh object, a tetrahedron unless told otherwise."""
     return link(name, make_mesh(name, vertices, faces))
+
+
+def modify_with_nodes(thing: bpy.types.Object) -> bpy.types.NodeTree:
+    """A new, empty geometry nodes modifier's tree, which takes the object's geometry and gives some."""
+    group = bpy.data.node_groups.new("G", "GeometryNodeTree")
+    for in_out in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Geometry", in_out=in_out, socket_type="NodeSocketGeometry")
+    thing.modifiers.new("Nodes", "NODES").node_group = group
+    return group
+
+
+def instance_on_grid(side: int, build: Callable) -> bpy.types.Object:
+    """An object whose geometry nodes instance what `build(nodes, links)` returns on a grid of points."""
+    scatter = link("Scatter", bpy.data.meshes.new("Scatter"))
+    group = modify_with_nodes(scatter)
+    nodes, links = group.nodes, group.links
+    grid = nodes.new("GeometryNodeMeshGrid")
+    grid.inputs["Vertices X"].default_value = grid.inputs["Vertices Y"].default_value = side
+    on_points, output = nodes.new("GeometryNodeInstanceOnPoints"), nodes.new("NodeGroupOutput")
+    links.new(grid.outputs[0], on_points.inputs["Points"])
+    links.new(build(nodes, links), on_points.inputs["Instance"])
+    links.new(on_points.outputs[0], output.inputs[0])
+    return scatter
 
 
 def node_tree(owner: bpy.types.ID) -> bpy.types.NodeTree:

@@ -13,8 +13,9 @@ from hypothesis.extra.numpy import array_shapes, arrays
 from sync_scenes import link, make_material, make_object, sync
 
 from addon.scene import Scene
+from addon.scene.arrays import same_array
 from addon.sync import Mirror
-from addon.sync.changes import Messages, same_array
+from addon.sync.changes import Messages
 
 
 def changed(before: Scene, after: Scene) -> set[str]:

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix
-from sync_scenes import depsgraph, link, make_object, sync, world_points
+from sync_scenes import depsgraph, instance_on_grid, link, make_object, sync, world_points
 
 
 def assert_same_points_as_depsgraph(scene) -> None:
@@ -57,22 +57,6 @@ def test_nested_collection_instances(empty_scene):
     scene = sync().scene
     assert (len(scene.meshes), len(scene.batches), count(scene)) == (1, 1, 6)
     assert_same_points_as_depsgraph(scene)
-
-
-def instance_on_grid(side: int, build) -> bpy.types.Object:
-    """An object whose geometry nodes instance what `build(nodes, links)` returns on a grid of points."""
-    group = bpy.data.node_groups.new("G", "GeometryNodeTree")
-    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    nodes, links = group.nodes, group.links
-    grid = nodes.new("GeometryNodeMeshGrid")
-    grid.inputs["Vertices X"].default_value = grid.inputs["Vertices Y"].default_value = side
-    on_points, output = nodes.new("GeometryNodeInstanceOnPoints"), nodes.new("NodeGroupOutput")
-    links.new(grid.outputs[0], on_points.inputs["Points"])
-    links.new(build(nodes, links), on_points.inputs["Instance"])
-    links.new(on_points.outputs[0], output.inputs[0])
-    scatter = link("Scatter", bpy.data.meshes.new("Scatter"))
-    scatter.modifiers.new("Nodes", "NODES").node_group = group
-    return scatter
 
 
 def test_geometry_nodes_instances_of_an_object(empty_scene):

@@ -7,7 +7,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from sync_scenes import corner_positions, link, make_mesh, make_object, only_mesh, sync
+from sync_scenes import corner_positions, link, make_mesh, make_object, modify_with_nodes, only_mesh, sync
+
+from addon.sync import Mirror
 
 FINITE = st.floats(-1e3, 1e3, width=32)
 
@@ -116,6 +118,82 @@ def test_colour_attribute_is_linear(empty_scene, domain, kind):
     colors = only_mesh(sync().scene).colors
     np.testing.assert_allclose(colors[-1], (0.5, 0.25, 0.125, 1.0), atol=0.004)
     np.testing.assert_allclose(colors[0], (1.0, 0.0, 0.0, 1.0), atol=0.004)
+
+
+def add_velocities(data: bpy.types.Mesh, kind: str = "FLOAT_VECTOR", domain: str = "POINT") -> np.ndarray:
+    """An attribute as simulations write it, m/s; vectors grow with the vertex."""
+    attribute = data.attributes.new("velocity", kind, domain)
+    vectors = np.arange(3 * len(data.vertices), dtype=np.float32).reshape(-1, 3)
+    if (kind, domain) == ("FLOAT_VECTOR", "POINT"):
+        attribute.data.foreach_set("vector", vectors.ravel())
+    return vectors
+
+
+@pytest.mark.parametrize("smooth", [False, True], ids=["by corner", "by point"])
+def test_velocities_are_per_frame_and_belong_to_their_vertices(empty_scene, smooth):
+    empty_scene.render.fps, empty_scene.render.fps_base = 30, 1.5
+    data = make_object().data
+    data.polygons.foreach_set("use_smooth", [smooth] * len(data.polygons))
+    per_second = add_velocities(data)
+    mesh = only_mesh(sync().scene)
+    assert len(mesh.positions) == (4 if smooth else 12)
+    points = {tuple(vertex.co): vertex.index for vertex in data.vertices}
+    indices = [points[tuple(position)] for position in mesh.positions.tolist()]
+    np.testing.assert_array_equal(mesh.velocities, per_second[indices] / np.float32(20.0))
+    assert mesh.velocities.dtype == np.float32
+
+
+def test_a_mesh_without_velocities_has_none(empty_scene):
+    make_object()
+    assert only_mesh(sync().scene).velocities is None
+
+
+@pytest.mark.parametrize(("kind", "domain"), [("FLOAT_VECTOR", "CORNER"), ("FLOAT", "POINT"), ("FLOAT_COLOR", "POINT")])
+def test_what_is_only_called_velocity_is_none(empty_scene, kind, domain):
+    add_velocities(make_object().data, kind, domain)
+    assert only_mesh(sync().scene).velocities is None
+
+
+def test_velocities_that_are_not_finite_are_zero(empty_scene):
+    data = make_object().data
+    per_second = add_velocities(data)
+    per_second[2] = (float("nan"), float("inf"), 24.0)
+    data.attributes["velocity"].data.foreach_set("vector", per_second.ravel())
+    mesh = only_mesh(sync().scene)
+    assert np.isfinite(mesh.velocities).all()
+    (row,) = np.unique(mesh.velocities[(mesh.positions == data.vertices[2].co).all(axis=1)], axis=0)
+    np.testing.assert_array_equal(row, (0.0, 0.0, np.float32(24.0) / np.float32(empty_scene.render.fps)))
+    assert np.abs(mesh.velocities).max() == np.float32(24.0) / np.float32(empty_scene.render.fps)
+
+
+def test_velocities_from_geometry_nodes(empty_scene):
+    tree = modify_with_nodes(make_object())
+    store = tree.nodes.new("GeometryNodeStoreNamedAttribute")
+    store.data_type, store.domain = "FLOAT_VECTOR", "POINT"
+    store.inputs["Name"].default_value = "velocity"
+    value = next(socket for socket in store.inputs if socket.name == "Value" and socket.type == "VECTOR")
+    value.default_value = (24.0, -48.0, 0.0)
+    start, end = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+    tree.links.new(start.outputs[0], store.inputs["Geometry"])
+    tree.links.new(store.outputs[0], end.inputs[0])
+    mesh = only_mesh(sync().scene)
+    np.testing.assert_array_equal(mesh.velocities, np.tile(np.float32([1.0, -2.0, 0.0]), (12, 1)))
+
+
+def test_velocities_that_change_are_a_new_version_with_the_same_triangles(empty_scene):
+    data = make_object().data
+    add_velocities(data)
+    mirror = Mirror()
+    versions = [only_mesh(sync(mirror).scene)]
+    data.attributes["velocity"].data[0].vector.x += 24.0
+    data.update()
+    versions.append(only_mesh(sync(mirror).scene))
+    empty_scene.render.fps *= 2
+    versions.append(only_mesh(sync(mirror).scene))
+    assert len({mesh.version for mesh in versions}) == 3
+    assert versions[0].triangles is versions[1].triangles is versions[2].triangles
+    np.testing.assert_array_equal(versions[2].velocities, versions[1].velocities / 2)
+    assert np.abs(versions[1].velocities - versions[0].velocities).max() == 1.0
 
 
 @pytest.mark.parametrize(

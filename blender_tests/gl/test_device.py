@@ -181,8 +181,9 @@ def test_a_refused_begin_leaves_a_renderer_that_works(monkeypatch):
         depths.append(depth_of(renderer, SCENE, builders.camera(), settings)[8, 8, 0])
         with monkeypatch.context() as broken:
             broken.setattr(opened.programs, "get", fail)
+            renderer.begin(other, builders.camera(), settings)
             with pytest.raises(ShaderError):
-                renderer.begin(other, builders.camera(), settings)
+                renderer.render_sample()
         depths.append(depth_of(renderer, other, builders.camera(), settings)[8, 8, 0])
         renderer.release()
         return depths

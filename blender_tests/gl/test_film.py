@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from addon.scene import Channel, DebugView
+from addon.scene import Channel, DebugView, LightKind, Variant
 from blender_tests import builders
 
 GLOWING = builders.material(emission=(1.0, 1.0, 1.0), base_color=(0, 0, 0))
@@ -59,13 +57,17 @@ def test_background_is_the_world_or_transparent(render):
 def test_debug_views_show_their_channel_of_their_layer(render, view, layer):
     front = builders.material("front", base_color=(0.5, 0.25, 0), metallic=1.0, roughness=0.2, emission=(2, 0, 0))
     back = builders.material("back", base_color=(0.0, 0.25, 0.5), metallic=0.0, roughness=0.8, emission=(0, 3, 0))
+    exit_color = (0.2, 0.4, 0.8)
+    away = np.diag([-1.0, 1.0, -1.0, 1.0])
     scene = builders.scene(
         builders.quad("front", z=1.0),
         builders.quad("back", z=-1.0),
-        materials=(front, back),
+        builders.quad("exit", z=2.0),
+        materials=(front, back, builders.material("exit", base_color=exit_color)),
         batches=[
             builders.batch("front", materials=("front",), object_index=1),
             builders.batch("back", materials=("back",), object_index=2),
+            builders.batch("exit", [away], materials=("exit",)),
         ],
     )
     shown = render(scene, builders.camera(), debug_view=view, debug_layer=layer).channels[Channel.COMBINED][16, 16]
@@ -79,6 +81,10 @@ def test_debug_views_show_their_channel_of_their_layer(render, view, layer):
         DebugView.ROUGHNESS: (materials[layer].roughness,) * 3,
         DebugView.EMISSION: materials[layer].emission,
         DebugView.DIRECT: materials[layer].emission,
+        DebugView.MOTION: (0.5, 0.5, 0.5),
+        DebugView.EXIT_DEPTH: (5 / (1 + 5),) * 3,
+        DebugView.EXIT_NORMAL: (0.5, 0.5, 1.0),
+        DebugView.EXIT_ALBEDO: exit_color,
     }
     if view is DebugView.OBJECT_INDEX:
         other = render(scene, builders.camera(), debug_view=view, debug_layer=1 - layer)
@@ -89,8 +95,46 @@ def test_debug_views_show_their_channel_of_their_layer(render, view, layer):
 
 def test_light_samples_converge_from_the_centre(render):
     """The mean over samples approaches the integral: 64 samples are nearer to 1024 than one is."""
-    light = builders.light("AREA", (0.4, 0.2, 0.6), (5, 5, 5), size=(1.5, 1.5))
-    light = replace(light, kind=type(builders.light().kind)("AREA"))
+    light = builders.light(LightKind.AREA, (0.4, 0.2, 0.6), (5, 5, 5), size=(1.5, 1.5))
     scene = builders.scene(builders.quad("q"), lights=(light,))
     means = [render(scene, builders.camera(), samples=n).channels[Channel.COMBINED] for n in (1, 64, 1024)]
     assert np.abs(means[1] - means[2]).max() < 0.05 * np.abs(means[0] - means[2]).max()
+
+
+@pytest.mark.parametrize("orthographic", [False, True])
+def test_a_guard_band_does_not_change_the_picture(render, orthographic):
+    """Highlights, positions and layers of a slanted plane, which fills the guard band too, to float32's rounding."""
+    slope = np.array([[1, 0, 0.3, 0], [0, 1, 0, 0], [-0.3, 0, 1, 0], [0, 0, 0, 1]])
+    glossy = builders.material(
+        metallic=0.5, roughness=0.3, specular=0.2, base_color=(0.9, 0.5, 0.2), emission=(0.0, 0.0, 0.1)
+    )
+    scene = builders.scene(
+        builders.quad("front", half=20.0),
+        builders.quad("back", z=-2.0, half=20.0),
+        materials=(glossy,),
+        batches=[builders.batch("front", [slope]), builders.batch("back", [slope])],
+        lights=(builders.light(LightKind.AREA, (0.4, 0.2, 0.6), (5, 5, 5), size=(1.5, 1.5)),),
+    )
+    camera = builders.camera(orthographic=orthographic)
+    plain, guarded = (
+        render(
+            scene,
+            camera,
+            width=31,
+            height=18,
+            samples=3,
+            filter_radius=1.5,
+            channels=tuple(Channel),
+            deep_output=True,
+            variant=Variant.REPROJECT,
+            guard_band=guard_band,
+        )
+        for guard_band in (0, 7)
+    )
+    assert (plain.plan.guard_band, guarded.plan.guard_band) == (0, 7)
+    for channel in Channel:
+        assert plain.channels[channel].shape == guarded.channels[channel].shape
+        np.testing.assert_allclose(guarded.channels[channel], plain.channels[channel], rtol=1e-4, atol=1e-5)
+    for without, within in zip(plain.layers, guarded.layers, strict=True):
+        np.testing.assert_allclose(within.depth, without.depth, rtol=1e-5)
+        np.testing.assert_allclose(within.radiance, without.radiance, rtol=1e-4, atol=1e-5)

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`build.py render SNAPSHOT.npz --set`: render settings by name, or an error that says what is allowed."""
+"""`build.py render SNAPSHOT.npz`: settings by name, or an error that says what is allowed; the frames it knows of."""
+
+from dataclasses import replace
 
 import pytest
 
-from addon.scene import RenderSettings
-from addon.scene.settings import DebugView
-from tooling.snapshot_job import JobError, settings_of
+from addon.scene import Moment, RenderSettings, Sequence, snapshot
+from addon.scene.settings import DebugView, Layering, Variant
+from blender_tests import builders
+from tooling.snapshot_job import JobError, frames_of, settings_of
 
 
 def settings(*assignments, resolution=(64, 32), samples=None):
@@ -31,6 +34,14 @@ def test_numbers_booleans_and_enumerations_by_name():
     assert settings(("transparent_film", "off")).transparent_film is False
 
 
+def test_how_layers_are_generated_can_be_set():
+    chosen = settings(
+        ("variant", "REPROJECT"), ("layering", "VERTEX_SHADER"), ("guard_band", "16"), ("relative_separation", "on")
+    )
+    assert (chosen.variant, chosen.layering) == (Variant.REPROJECT, Layering.VERTEX_SHADER)
+    assert (chosen.guard_band, chosen.relative_separation) == (16, True)
+
+
 def test_an_unknown_name_lists_the_known_ones():
     with pytest.raises(JobError, match=r"no setting 'lairs'; it has .*\blayers\b"):
         settings(("lairs", "4"))
@@ -47,6 +58,7 @@ def test_what_the_job_decides_itself_cannot_be_set(name):
     [
         ("transparent_film", "maybe", "transparent_film: true or false, not 'maybe'"),
         ("debug_view", "SHINY", "debug_view: one of NONE, .*NORMAL.*, not 'SHINY'"),
+        ("variant", "FANCY", "variant: one of TWO_PASS, .*REPROJECT, not 'FANCY'"),
         ("layers", "two", "layers: .*'two'"),
         ("minimum_separation", "far", "minimum_separation: .*'far'"),
     ],
@@ -54,3 +66,32 @@ def test_what_the_job_decides_itself_cannot_be_set(name):
 def test_what_is_no_value_is_refused_by_name(name, text, message):
     with pytest.raises(JobError, match=message):
         settings((name, text))
+
+
+def seen(x):
+    """A scene with its own camera at some x."""
+    return replace(
+        builders.scene(builders.quad("q")),
+        camera=replace(builders.camera(), world_from_camera=builders.translation(x, 0.0, 3.0)),
+    )
+
+
+def test_the_frames_of_a_snapshot_are_its_sequence(tmp_path):
+    snapshot.save(tmp_path / "scene.npz", seen(3.0), seen(2.0), seen(1.0))
+    frame, sequence = frames_of(snapshot.load(tmp_path / "scene.npz"), "scene.npz")
+    frames = frame, sequence.previous, sequence.earlier
+    assert [moment.camera.position[0] for moment in frames] == [3.0, 2.0, 1.0]
+    assert all(moment.scene.camera is moment.camera for moment in frames)
+    assert not sequence.continuous
+
+
+def test_without_other_frames_nothing_is_known_of_any():
+    scene = seen(3.0)
+    assert frames_of(snapshot.Snapshot(scene), "scene.npz") == (Moment(scene, scene.camera), Sequence())
+
+
+def test_a_frame_without_a_camera_is_not_known():
+    _, sequence = frames_of(snapshot.Snapshot(seen(3.0), replace(seen(2.0), camera=None)), "scene.npz")
+    assert sequence.previous is None
+    with pytest.raises(JobError, match="scene.npz: the scene has no camera"):
+        frames_of(snapshot.Snapshot(builders.scene(), seen(2.0)), "scene.npz")

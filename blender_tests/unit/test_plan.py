@@ -1,12 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
-from addon.render import plan
-from addon.render.layout import CHANNELS, DEPTH_BYTES
-from addon.scene import Channel, DebugView, LightKind, RenderSettings
+from addon.render import frames_before, plan
+from addon.scene import Channel, DebugView, LightKind, RenderSettings, Variant
 from blender_tests import builders
 
 SETTINGS = RenderSettings(64, 64, layers=4)
@@ -21,6 +19,10 @@ def reasons(planned):
     return {item.name: item.reason for item in planned.left_out}
 
 
+def layers_written(planned):
+    return {target.name: target.layers for target in planned.targets}
+
+
 def test_a_lit_scene_needs_every_pass():
     assert names(plan(LIT, SETTINGS)) == ["gbuffer", "direct", "composite"]
 
@@ -30,7 +32,7 @@ def test_layers_nobody_reads_are_left_out_with_the_reason():
     assert planned.layers == 1
     assert "nothing reads them" in reasons(planned)["gbuffer layers 2–4"]
     assert "Δz unused" in reasons(planned)["minimum separation"]
-    assert "PEEL" not in planned.find("gbuffer").defines
+    assert "gbuffer.oracle" not in [target.name for target in planned.targets]
 
 
 @pytest.mark.parametrize(
@@ -45,9 +47,9 @@ def test_layers_nobody_reads_are_left_out_with_the_reason():
 def test_layers_are_built_for_whoever_reads_them(change, layers):
     planned = plan(LIT, replace(SETTINGS, **change))
     assert planned.layers == layers
-    written = {target.name: target.layers for target in planned.find("gbuffer").writes}
+    written = layers_written(planned)
     assert written["gbuffer.view_depth"] == written["gbuffer.normal"] == layers
-    assert ("gbuffer.oracle_0" in written) == (layers > 1)
+    assert ("gbuffer.oracle" in written) == (layers > 1)
 
 
 def test_nothing_to_light_with_means_no_direct_pass():
@@ -106,21 +108,80 @@ def test_what_is_read_is_written(deep):
     assert all(set(item.reads) <= written for item in planned.passes)
 
 
-def test_motion_vectors_have_a_slot_that_nothing_fills_yet():
-    everything = replace(SETTINGS, deep_output=True, channels=frozenset(Channel))
+DEEP = replace(SETTINGS, deep_output=True)
+ONE_PASS = [variant for variant in Variant if variant is not Variant.TWO_PASS]
+
+
+def test_motion_and_exit_surfaces_are_built_for_whoever_reads_them():
+    everything = replace(DEEP, channels=frozenset(Channel))
     planned = plan(LIT, everything)
-    assert "gbuffer.motion" not in [target.name for target in planned.targets]
+    assert "gbuffer.motion" not in layers_written(planned)
     assert reasons(planned)["gbuffer motion"] == "no pass or output reads it"
+    assert reasons(planned)["exit"].startswith("no effect, output or debug view")
+    assert layers_written(plan(LIT, replace(everything, motion_vectors=True)))["gbuffer.motion"] == 4
+    planned = plan(LIT, replace(everything, exit_surfaces=True))
+    assert names(planned) == ["gbuffer", "exit", "direct", "composite"]
+    assert layers_written(planned)["exit.view_depth"] == 4
+    shown = plan(LIT, replace(SETTINGS, debug_view=DebugView.EXIT_ALBEDO, debug_layer=1))
+    assert names(shown) == ["gbuffer", "exit", "composite"]
+    assert "exit.base_color" in shown.find("composite").reads
 
 
-def test_a_layer_takes_no_more_than_48_bytes_per_pixel():
-    assert sum(channel.target(1).bytes_per_pixel for channel in CHANNELS) + DEPTH_BYTES <= 48
+def test_deeper_layers_store_only_what_is_read_of_them():
+    settings = replace(SETTINGS, debug_view=DebugView.ALBEDO, debug_layer=2, channels=frozenset({Channel.OBJECT_INDEX}))
+    planned = plan(LIT, settings)
+    written = layers_written(planned)
+    assert written["gbuffer.base_color"] == 3
+    assert written["gbuffer.object_index"] == 1
+    assert "there" in reasons(planned)["gbuffer object_index behind layer 1"]
 
 
-def test_the_readme_lists_every_channel_as_it_is():
-    formats = {("f4", 1): "R32F", ("nu2", 2): "RG16", ("f2", 4): "RGBA16F", ("f1", 2): "RG8", ("f4", 4): "RGBA32F"}
-    formats |= {("u2", 1): "R16UI", ("f2", 2): "RG16F"}
-    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
-    for channel in CHANNELS:
-        assert f"| {channel.name} | {formats[channel.dtype, channel.components]} | {channel.meaning} |" in readme
-    assert f"{sum(channel.target(1).bytes_per_pixel for channel in CHANNELS)} bytes per pixel and layer" in readme
+@pytest.mark.parametrize("variant", ONE_PASS)
+def test_one_pass_variants_read_an_oracle(variant):
+    planned = plan(LIT, replace(DEEP, variant=variant, samples=2))
+    assert names(planned)[:2] == ["oracle", "gbuffer"]
+    extra = 1 if variant is Variant.DELAY else 0  # a film's next sample is known ahead
+    written = layers_written(planned)
+    assert written["gbuffer.oracle"] == 3
+    assert written["gbuffer.view_depth"] == planned.drawn_layers == 4 + extra
+    viewport = plan(LIT, replace(DEEP, variant=variant), continuous=True)
+    assert viewport.look_ahead == (variant in (Variant.DELAY, Variant.PREDICT))
+
+
+def test_nothing_looks_ahead_of_the_last_picture():
+    assert not plan(LIT, replace(DEEP, variant=Variant.DELAY, samples=1)).look_ahead
+
+
+@pytest.mark.parametrize("variant", ONE_PASS)
+def test_a_single_layer_has_no_variant(variant):
+    planned = plan(LIT, replace(SETTINGS, variant=variant))
+    assert names(planned) == ["gbuffer", "direct", "composite"]
+    assert reasons(planned)["oracle"] == "only one layer is built"
+    assert not planned.one_pass
+
+
+def test_the_guard_band_is_built_where_something_reads_beyond_the_edge():
+    planned = plan(LIT, replace(DEEP, guard_band=64))
+    assert planned.guard_band == 0
+    assert "beyond the picture's edge" in reasons(planned)["guard band"]
+    assert plan(LIT, replace(DEEP, guard_band=64, variant=Variant.REPROJECT)).guard_band == 64
+    single = plan(LIT, replace(SETTINGS, guard_band=64, variant=Variant.REPROJECT))
+    assert single.guard_band == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "frames"),
+    [
+        ({}, 0),
+        ({"variant": Variant.REPROJECT}, 0),
+        ({"deep_output": True, "variant": Variant.REPROJECT}, 1),
+        ({"deep_output": True, "variant": Variant.PREVIOUS}, 1),
+        ({"deep_output": True, "variant": Variant.PREDICT}, 2),
+        ({"deep_output": True, "variant": Variant.DELAY}, 0),
+        ({"deep_output": True, "layers": 1, "variant": Variant.PREDICT}, 0),
+        ({"deep_output": True, "motion_vectors": True}, 1),
+        ({"debug_view": DebugView.MOTION}, 1),
+    ],
+)
+def test_only_the_frames_that_are_needed_are_evaluated(change, frames):
+    assert frames_before(replace(SETTINGS, **change)) == frames

@@ -9,7 +9,7 @@ from addon.render.programs import ProgramSpec, ShaderError, all_variants, expand
 def shaders(tmp_path, monkeypatch):
     monkeypatch.setattr(programs, "shader_root", lambda: tmp_path)
     (tmp_path / "a.frag").write_text('first\n#include "b.glsl"\nthird\n#include "b.glsl"\n#include "generated/G.glsl"')
-    (tmp_path / "b.glsl").write_text("inside b")
+    (tmp_path / "b.glsl").write_text("inside A")
     return tmp_path
 
 
@@ -18,16 +18,16 @@ def spec(**arguments):
 
 
 def test_includes_are_expanded_once_with_line_numbers_of_their_own_file(shaders):
-    text, files = expand("a.frag", spec(defines=frozenset({"B", "A 1"})))
+    text, files = expand("a.frag", spec(defines=frozenset({"first", "A 1"})))
     assert files == ("a.frag", "b.glsl", "generated/G.glsl")
     assert text.splitlines() == [
         "#version 410 core",
         "#define A 1",
-        "#define B",
+        "#define first",
         "#line 1 0",
         "first",
         "#line 1 1",
-        "inside b",
+        "inside A",
         "#line 3 0",
         "third",
         "#line 5 0",
@@ -35,6 +35,12 @@ def test_includes_are_expanded_once_with_line_numbers_of_their_own_file(shaders)
         "generated text",
         "#line 6 0",
     ]
+
+
+def test_a_stage_gets_the_defines_that_it_mentions_and_no_others(shaders):
+    text, _ = expand("a.frag", spec(defines=frozenset({"A", "ELSEWHERE 2"})))
+    assert "#define A\n" in text
+    assert "ELSEWHERE" not in text
 
 
 def test_missing_files_are_named(shaders):
@@ -53,4 +59,10 @@ def test_driver_logs_name_our_files(log):
 
 def test_every_declared_variant_expands():
     names = {name.split()[0] for name, _, _ in all_variants()}
-    assert names >= {"gbuffer/gbuffer.vert", "gbuffer/gbuffer.frag", "direct/direct.frag", "composite/composite.frag"}
+    assert names >= {
+        "gbuffer/gbuffer.vert",
+        "gbuffer/gbuffer.geom",
+        "gbuffer/gbuffer.frag",
+        "direct/direct.frag",
+        "composite/composite.frag",
+    }

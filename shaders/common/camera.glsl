@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Space: world axes with the camera's position as origin ("relative"). View depth is measured along the view axis.
+// Pixels: of the whole guarded picture; the picture itself begins `guard_band` pixels from its left and lower edge.
 
 #include "generated/CameraUniforms.glsl"
 
@@ -9,7 +10,7 @@ vec2 window_point(vec2 pixel)
     return mix(camera_window.xz, camera_window.yw, pixel / camera_resolution);
 }
 
-/** Relative position (m) of what a pixel (gl_FragCoord.xy) shows at a view depth (m). */
+/** Relative position (m) of what a pixel shows at a view depth (m). */
 vec3 relative_position(vec2 pixel, float view_depth)
 {
     vec2 point = window_point(pixel) * (camera_orthographic != 0 ? 1.0 : view_depth);

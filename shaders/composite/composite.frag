@@ -5,6 +5,7 @@
 #include "common/camera.glsl"
 #include "common/hash.glsl"
 #include "common/octahedral.glsl"
+#include "common/shared_exponent.glsl"
 #include "generated/CompositeUniforms.glsl"
 #include "generated/outputs.glsl"
 
@@ -14,7 +15,28 @@ uniform sampler2DArray base_color_layers;
 uniform sampler2DArray material_layers;
 uniform sampler2DArray emission_layers;
 uniform usampler2DArray object_index_layers;
+uniform sampler2DArray motion_layers;
+uniform sampler2DArray exit_view_depth_layers;
+uniform sampler2DArray exit_normal_layers;
+uniform sampler2DArray exit_base_color_layers;
 uniform sampler2DArray radiance_layers;
+
+// Motion of this many pixels is shown with half of the greatest saturation.
+const float MOTION_SCALE = 8.0;
+
+/** View depth (m) as 0…1: half where it is 1 m, 1 at infinity. */
+float depth_shade(float view_depth)
+{
+    return isinf(view_depth) ? 1.0 : view_depth / (1.0 + view_depth);
+}
+
+#if defined(DEBUG_EXIT_NORMAL) || defined(DEBUG_EXIT_ALBEDO)
+/** Whether a layer has an exit surface at a texel. */
+bool has_exit(ivec3 texel)
+{
+    return !isinf(texelFetch(exit_view_depth_layers, texel, 0).r);
+}
+#endif
 
 /** What a covered texel shows. */
 vec3 shown_color(ivec3 texel, float view_depth)
@@ -22,7 +44,7 @@ vec3 shown_color(ivec3 texel, float view_depth)
 #if defined(DIRECT) || defined(DEBUG_DIRECT)
     return texelFetch(radiance_layers, texel, 0).rgb;
 #elif defined(DEBUG_DEPTH)
-    return vec3(view_depth / (1.0 + view_depth));
+    return vec3(depth_shade(view_depth));
 #elif defined(DEBUG_NORMAL)
     return 0.5 * decode_octahedral(texelFetch(normal_layers, texel, 0).rg) + 0.5;
 #elif defined(DEBUG_ALBEDO)
@@ -32,10 +54,20 @@ vec3 shown_color(ivec3 texel, float view_depth)
 #elif defined(DEBUG_ROUGHNESS)
     return texelFetch(material_layers, texel, 0).ggg;
 #elif defined(DEBUG_EMISSION)
-    return texelFetch(emission_layers, texel, 0).rgb;
+    return decode_shared_exponent(texelFetch(emission_layers, texel, 0));
 #elif defined(DEBUG_OBJECT_INDEX)
     uint object_index = texelFetch(object_index_layers, texel, 0).r;
     return vec3(hash_to_unit(uvec2(object_index, 0u)), hash_to_unit(uvec2(object_index, 1u)).x);
+#elif defined(DEBUG_MOTION)
+    // Red: to the right, green: up; grey: at rest. The direction stays readable however fast, and nothing is clipped.
+    vec2 motion = texelFetch(motion_layers, texel, 0).rg;
+    return vec3(0.5 + 0.5 * motion / (MOTION_SCALE + length(motion)), 0.5);
+#elif defined(DEBUG_EXIT_DEPTH)
+    return vec3(depth_shade(texelFetch(exit_view_depth_layers, texel, 0).r));
+#elif defined(DEBUG_EXIT_NORMAL)
+    return has_exit(texel) ? 0.5 * decode_octahedral(texelFetch(exit_normal_layers, texel, 0).rg) + 0.5 : vec3(0.0);
+#elif defined(DEBUG_EXIT_ALBEDO)
+    return has_exit(texel) ? texelFetch(exit_base_color_layers, texel, 0).rgb : vec3(0.0);
 #else
     return vec3(0.0);
 #endif
@@ -43,12 +75,13 @@ vec3 shown_color(ivec3 texel, float view_depth)
 
 void main()
 {
-    ivec3 shown = ivec3(gl_FragCoord.xy, shown_layer);
-    float shown_depth = texelFetch(view_depth_layers, shown, 0).r;
-    out_combined = isinf(shown_depth) ? background : vec4(shown_color(shown, shown_depth), 1.0);
+    vec2 pixel = gl_FragCoord.xy + float(guard_band);
+    ivec3 shown = ivec3(pixel, shown_layer);
+    float view_depth = texelFetch(view_depth_layers, shown, 0).r;
+    out_combined = isinf(view_depth) ? background : vec4(shown_color(shown, view_depth), 1.0);
 
 #if defined(FILM_NORMAL) || defined(FILM_DIFFUSE_COLOR)
-    ivec3 first = ivec3(gl_FragCoord.xy, 0);
+    ivec3 first = ivec3(pixel, 0);
     bool covered = !isinf(texelFetch(view_depth_layers, first, 0).r);
     vec3 normal = decode_octahedral(texelFetch(normal_layers, first, 0).rg);
 #endif
@@ -58,7 +91,7 @@ void main()
 #ifdef FILM_DIFFUSE_COLOR
     vec4 base_color = texelFetch(base_color_layers, first, 0);
     vec2 material = texelFetch(material_layers, first, 0).rg;
-    float n_dot_v = clamp(dot(normal, view_direction(gl_FragCoord.xy)), 0.0, 1.0);
+    float n_dot_v = clamp(dot(normal, view_direction(pixel)), 0.0, 1.0);
     Surface surface = make_surface(base_color.rgb, base_color.a, material.r, material.g, n_dot_v);
     out_diffuse_color = vec4(covered ? surface.diffuse_albedo : vec3(0.0), 0.0);
 #endif

@@ -7,6 +7,7 @@
 #include "common/hash.glsl"
 #include "common/lights.glsl"
 #include "common/octahedral.glsl"
+#include "common/shared_exponent.glsl"
 #include "generated/DirectUniforms.glsl"
 
 #if defined(SUN_LIGHTS) || defined(AREA_LIGHTS) || defined(SPHERE_LIGHTS) || defined(DISK_LIGHTS)
@@ -32,7 +33,8 @@ vec3 lit_radiance(Surface surface, vec3 position, vec3 normal, vec3 view)
 #ifdef SPECULAR
     bool glossy = any(greaterThan(surface.specular_f0, vec3(0.0)));
     // Highlights take another light sample in every pixel: shared ones would show as separate dots on glossy surfaces.
-    vec2 specular_sample = fract(light_sample + hash_to_unit(uvec2(gl_FragCoord.xy)));
+    // Counted from the picture's corner, so that a guard band does not change the picture.
+    vec2 specular_sample = fract(light_sample + hash_to_unit(uvec2(ivec2(gl_FragCoord.xy) - guard_band)));
 #endif
     vec3 radiance = vec3(0.0);
     for (int index = 0; index < light_count; ++index) {
@@ -63,7 +65,7 @@ void main()
     }
     vec3 radiance = vec3(0.0);
 #ifdef EMISSION
-    radiance += texelFetch(emission_layers, texel, 0).rgb;
+    radiance += decode_shared_exponent(texelFetch(emission_layers, texel, 0));
 #endif
 #if defined(LIGHTS) || defined(WORLD)
     vec3 normal = decode_octahedral(texelFetch(normal_layers, texel, 0).rg);

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One layer of the deep G-buffer. Layer k keeps the nearest fragment with z > Z(k-1) + Δz, z the linear view depth
-// (Mara et al. 2016, "Deep G-Buffers for Stable Global Illumination Approximation", two-pass generation).
+// Layers of the deep G-buffer. Layer k keeps the nearest fragment with z > Z(k-1) + Δz, z the linear view depth, and
+// Z(k-1) what an oracle says of the layer before (Mara et al. 2016, "Deep G-Buffers for Stable Global Illumination
+// Approximation"). With EXIT, what is kept is the first back face behind each layer.
 
 #include "common/constants.glsl"
 #include "common/finite.glsl"
 #include "common/octahedral.glsl"
+#include "common/shared_exponent.glsl"
+#include "gbuffer/surface.glsl"
 #include "generated/GBufferUniforms.glsl"
 #include "generated/MaterialUniforms.glsl"
 #include "generated/outputs.glsl"
@@ -12,33 +15,80 @@
 #ifdef TEXTURE
 uniform sampler2D base_color_texture;
 #endif
-#ifdef PEEL
-uniform sampler2DArray oracle; // view depth of the layer before
+#if defined(ORACLE) || defined(EXIT)
+uniform sampler2DArray oracle; // view depth per layer; EXIT: of the finished layers
 #endif
 
-in float v_view_depth;
-#ifdef WRITE_NORMAL
-in vec3 v_position;
-in vec3 v_normal;
-flat in float v_handedness;
-#endif
-#ifdef TEXTURE
-in vec2 v_uv;
-#endif
-#ifdef ATTRIBUTE
-in vec3 v_color;
-#endif
-#ifdef WRITE_OBJECT_INDEX
-flat in uint v_object_index;
+in Surface
+{
+    SURFACE
+} surface;
+
+#if defined(WRITE_NORMAL) || defined(EXIT)
+/** Whether the triangle's front, by its winding before any mirroring, faces the viewer. */
+bool is_front()
+{
+    return gl_FrontFacing == (surface.handedness * image_handedness > 0.0);
+}
 #endif
 
-#ifdef PEEL
-/** Whether the fragment lies within the minimum separation behind the previous layer. */
+#ifdef PREVIOUS
+/** Pixels (x right, y up) moved since the previous frame; 0 where the surface was behind the camera. */
+vec2 motion_vector()
+{
+    if (!(surface.previous.z > 0.0))
+        return vec2(0.0);
+    // Now and then in one vector operation, which rounds both alike: what did not move gives exactly 0.
+    vec4 points = vec4(surface.clip.xy, surface.previous.xy) / vec4(surface.clip.zz, surface.previous.zz);
+    return 0.5 * resolution * (points.xy - points.zw);
+}
+#endif
+
+#ifdef ORACLE
+/**
+ * Whether a view depth is within the minimum separation behind the previous layer.
+ *
+ * `slope`: how much the depth may differ because the oracle was sampled elsewhere. Variants also round differently,
+ * by a few units in the last place; without either allowance a surface would be its own next layer.
+ */
+bool too_near(ivec2 pixel, float view_depth, float slope)
+{
+    float nearer = texelFetch(oracle, ivec3(pixel, max(surface.layer - oracle_layer_offset, 0)), 0).r;
+    float guard = max(4.0 * FLOAT_EPSILON * nearer, slope);
+    return !(view_depth > nearer + (minimum_separation + relative_separation * nearer) + guard);
+}
+
+/** Whether this fragment is, by what the oracle knows. Derivatives: call where all fragments of a quad do. */
 bool too_near_previous_layer()
 {
-    float previous = texelFetch(oracle, ivec3(gl_FragCoord.xy, 0), 0).r;
-    // The last term keeps a surface from peeling itself where variants round differently.
-    return !(v_view_depth > previous + minimum_separation + 4.0 * FLOAT_EPSILON * previous);
+    vec2 offset = vec2(oracle_drift);
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    float view_depth = surface.view_depth;
+#ifdef REPROJECT
+    // Off the screen the nearest pixel of its edge is asked; behind the camera nothing was seen, and the same pixel
+    // must do.
+    if (surface.previous.w >= clip_start)
+    {
+        vec2 origin = gl_FragCoord.xy - motion_vector() + oracle_offset;
+        origin = clamp(origin, vec2(0.0), resolution - 0.5);
+        pixel = ivec2(origin);
+        offset = abs(origin - (vec2(pixel) + 0.5));
+        view_depth = surface.previous.w;
+    }
+    vec2 change = abs(vec2(dFdx(surface.previous.w), dFdy(surface.previous.w)));
+#else
+    vec2 change = abs(vec2(dFdx(surface.view_depth), dFdy(surface.view_depth)));
+#endif
+    return too_near(pixel, view_depth, dot(change, offset));
+}
+#endif
+
+#ifdef EXIT
+/** Whether this fragment is a back face behind the finished layer. */
+bool is_exit()
+{
+    float entry = texelFetch(oracle, ivec3(gl_FragCoord.xy, surface.layer), 0).r;
+    return !is_front() && surface.view_depth > entry + 4.0 * FLOAT_EPSILON * entry;
 }
 #endif
 
@@ -46,11 +96,10 @@ bool too_near_previous_layer()
 /** Unit world-space shading normal on the viewer's side of the triangle. */
 vec3 facing_normal()
 {
-    vec3 geometric = image_handedness * cross(dFdx(v_position), dFdy(v_position));
-    bool front = gl_FrontFacing == (v_handedness * image_handedness > 0.0);
-    float squared = dot(v_normal, v_normal);
+    vec3 geometric = image_handedness * cross(dFdx(surface.position), dFdy(surface.position));
+    float squared = dot(surface.normal, surface.normal);
     if (squared > 0.0)
-        return v_normal * (front ? 1.0 : -1.0) * inversesqrt(squared);
+        return surface.normal * (is_front() ? 1.0 : -1.0) * inversesqrt(squared);
     // No usable normal: the triangle's own, which derivatives of a visible surface turn towards the viewer.
     float area = length(geometric);
     return area > 0.0 ? geometric / area : -forward.xyz;
@@ -61,34 +110,39 @@ vec3 facing_normal()
 /** Depth 1 at the near plane, falling to 0: what a 0…1 clip space stores without this (`Camera.projection`). */
 float reversed_depth()
 {
-    return orthographic != 0 ? (clip_end - v_view_depth) / (clip_end - clip_start) : clip_start / v_view_depth;
+    return orthographic != 0 ? (clip_end - surface.view_depth) / (clip_end - clip_start) : clip_start / surface.view_depth;
 }
 #endif
 
 void main()
 {
+    // Derivatives are taken before any fragment of a quad is discarded.
+#ifdef ORACLE
+    bool hidden = too_near_previous_layer();
+#endif
 #ifdef WRITE_NORMAL
     vec3 normal = facing_normal();
 #endif
 #ifdef TEXTURE
-    vec4 texel = texture(base_color_texture, v_uv, texture_lod_bias);
+    vec4 texel = texture(base_color_texture, surface.uv, texture_lod_bias);
 #endif
 #ifdef ALPHA_TEST
     // Level 0: averaging alpha would make distant foliage vanish.
-    if (material_emission.a * textureLod(base_color_texture, v_uv, 0.0).a < alpha_threshold)
+    if (material_emission.a * textureLod(base_color_texture, surface.uv, 0.0).a < alpha_threshold)
         discard;
 #endif
-#ifdef PEEL
-    if (layer > 0 && too_near_previous_layer())
+#ifdef ORACLE
+    if (hidden && surface.layer > 0 && surface.layer != look_ahead_layer)
+        discard;
+#endif
+#ifdef EXIT
+    if (!is_exit())
         discard;
 #endif
 #ifdef FRAGMENT_DEPTH
     gl_FragDepth = reversed_depth();
 #endif
-    out_view_depth = v_view_depth;
-#ifdef PEEL
-    out_oracle = v_view_depth;
-#endif
+    out_view_depth = surface.view_depth;
 #ifdef WRITE_NORMAL
     out_normal = encode_octahedral(normal);
 #endif
@@ -98,7 +152,7 @@ void main()
     base_color *= texel.rgb;
 #endif
 #ifdef ATTRIBUTE
-    base_color *= v_color;
+    base_color *= surface.color;
 #endif
     out_base_color = vec4(clamp(base_color, 0.0, 65504.0), material_base_color.a);
 #endif
@@ -106,9 +160,12 @@ void main()
     out_material = material_surface.xy;
 #endif
 #ifdef WRITE_EMISSION
-    out_emission = vec4(finite_radiance(material_emission.rgb), 1.0);
+    out_emission = encode_shared_exponent(finite_radiance(material_emission.rgb));
 #endif
 #ifdef WRITE_OBJECT_INDEX
-    out_object_index = v_object_index;
+    out_object_index = surface.object_index;
+#endif
+#ifdef WRITE_MOTION
+    out_motion = clamp(motion_vector(), -65504.0, 65504.0);
 #endif
 }

@@ -1,6 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Instanced triangles into camera-relative space: world axes, the camera's position as origin.
 
+#ifdef VERTEX_LAYER
+#if defined(GL_ARB_shader_viewport_layer_array)
+#extension GL_ARB_shader_viewport_layer_array : require
+#elif defined(GL_NV_viewport_array2)
+#extension GL_NV_viewport_array2 : require
+#else
+#extension GL_AMD_vertex_shader_layer : require
+#endif
+#endif
+
+#include "gbuffer/surface.glsl"
 #include "generated/GBufferUniforms.glsl"
 
 in vec3 in_position;
@@ -18,52 +29,124 @@ in vec3 in_translation_low; // what float32 loses of the fourth column
 #ifdef WRITE_OBJECT_INDEX
 in int in_object_index;
 #endif
+#ifdef PREVIOUS
+in vec3 in_previous_position;
+uniform sampler2D previous_poses;
+#endif
+#ifdef LOOK_AHEAD
+in vec3 in_next_position;
+uniform sampler2D next_poses;
+#endif
 
 // Every layer must place its fragments alike, whichever variant draws them.
 invariant gl_Position;
 
-out float v_view_depth;
-#ifdef WRITE_NORMAL
-out vec3 v_position;
-out vec3 v_normal;
-flat out float v_handedness;
+out Surface
+{
+    SURFACE
+} surface;
+#if defined(LOOK_AHEAD) && defined(GEOMETRY_LAYERS)
+out Ahead
+{
+    vec4 position;
+    float view_depth;
+} ahead;
 #endif
-#ifdef TEXTURE
-out vec2 v_uv;
+
+/** Rows of world-from-object with what float32 loses of the translation. */
+struct Pose
+{
+    vec4 row_0;
+    vec4 row_1;
+    vec4 row_2;
+    vec3 translation_low;
+};
+
+#if defined(PREVIOUS) || defined(LOOK_AHEAD)
+/** The pose of an instance from a texture with four texels each (`geometry.PoseTexture`). */
+Pose fetch_pose(sampler2D poses, int instance)
+{
+    int per_row = textureSize(poses, 0).x / 4;
+    ivec2 first = ivec2(4 * (instance % per_row), instance / per_row);
+    return Pose(texelFetch(poses, first, 0), texelFetch(poses, first + ivec2(1, 0), 0),
+                texelFetch(poses, first + ivec2(2, 0), 0), texelFetch(poses, first + ivec2(3, 0), 0).xyz);
+}
 #endif
-#ifdef ATTRIBUTE
-out vec3 v_color;
-#endif
-#ifdef WRITE_OBJECT_INDEX
-flat out uint v_object_index;
-#endif
+
+/** Object-space position (m) to world axes with a camera's position, given as two float32 parts, as origin. */
+vec3 relative_to(vec3 camera_high, vec3 camera_low, Pose pose, vec3 position)
+{
+    // Part by part: the high parts cancel exactly where object and camera are near each other.
+    precise vec3 high = vec3(pose.row_0.w, pose.row_1.w, pose.row_2.w) - camera_high;
+    precise vec3 translation = high + (pose.translation_low - camera_low);
+    precise vec3 relative = vec3(dot(pose.row_0.xyz, position), dot(pose.row_1.xyz, position),
+                                 dot(pose.row_2.xyz, position)) + translation;
+    return relative;
+}
 
 void main()
 {
-    // Part by part: the high parts cancel exactly where object and camera are near each other.
-    precise vec3 high = vec3(in_row_0.w, in_row_1.w, in_row_2.w) - camera_high.xyz;
-    precise vec3 translation = high + (in_translation_low - camera_low.xyz);
-    vec3 position = vec3(dot(in_row_0.xyz, in_position), dot(in_row_1.xyz, in_position),
-                         dot(in_row_2.xyz, in_position)) + translation;
-    gl_Position = clip_from_relative * vec4(position, 1.0);
-    v_view_depth = dot(forward.xyz, position);
-    gl_ClipDistance[0] = clip_end - v_view_depth;
-#ifdef WRITE_NORMAL
-    v_position = position;
+    Pose pose = Pose(in_row_0, in_row_1, in_row_2, in_translation_low);
+    vec3 relative = relative_to(camera_high.xyz, camera_low.xyz, pose, in_position);
+    precise vec4 clip = clip_from_relative * vec4(relative, 1.0);
+    precise float view_depth = dot(forward.xyz, relative);
+#ifdef VERTEX_LAYER
+    int instance = gl_InstanceID / layer_count;
+    int layer = gl_InstanceID % layer_count;
+#else
+    int instance = gl_InstanceID;
+    int layer = 0;
+#endif
+#ifdef PREVIOUS
+    // The very same steps as above: where nothing moved, the results are equal to the last bit.
+    vec3 previous_relative = relative_to(previous_camera_high.xyz, previous_camera_low.xyz,
+                                         fetch_pose(previous_poses, instance), in_previous_position);
+    precise vec4 previous_clip = previous_clip_from_relative * vec4(previous_relative, 1.0);
+    precise float previous_view_depth = dot(previous_forward.xyz, previous_relative);
+    surface.clip = clip.xyw;
+    surface.previous = vec4(previous_clip.xyw, previous_view_depth);
+#endif
+#ifdef LOOK_AHEAD
+    vec3 next_relative = relative_to(next_camera_high.xyz, next_camera_low.xyz, fetch_pose(next_poses, instance),
+                                     in_next_position);
+    precise vec4 next_clip = next_clip_from_relative * vec4(next_relative, 1.0);
+    precise float next_view_depth = dot(next_forward.xyz, next_relative);
+#ifdef GEOMETRY_LAYERS
+    ahead.position = next_clip;
+    ahead.view_depth = next_view_depth;
+#else
+    if (layer == look_ahead_layer)
+    {
+        clip = next_clip;
+        view_depth = next_view_depth;
+    }
+#endif
+#endif
+    gl_Position = clip;
+    gl_ClipDistance[0] = clip_end - view_depth;
+    surface.view_depth = view_depth;
+    surface.layer = first_layer + layer;
+#ifdef VERTEX_LAYER
+    gl_Layer = layer;
+#endif
+#if defined(WRITE_NORMAL) || defined(EXIT)
     // The cofactor matrix carries normals; its sign, unlike the inverse transpose's, does not depend on mirroring.
-    vec3 across = cross(in_row_1.xyz, in_row_2.xyz);
-    v_handedness = dot(in_row_0.xyz, across) < 0.0 ? -1.0 : 1.0;
-    v_normal = v_handedness * vec3(dot(across, in_normal),
-                                   dot(cross(in_row_2.xyz, in_row_0.xyz), in_normal),
-                                   dot(cross(in_row_0.xyz, in_row_1.xyz), in_normal));
+    vec3 across = cross(pose.row_1.xyz, pose.row_2.xyz);
+    surface.handedness = dot(pose.row_0.xyz, across) < 0.0 ? -1.0 : 1.0;
+#endif
+#ifdef WRITE_NORMAL
+    surface.position = relative;
+    surface.normal = surface.handedness * vec3(dot(across, in_normal),
+                                               dot(cross(pose.row_2.xyz, pose.row_0.xyz), in_normal),
+                                               dot(cross(pose.row_0.xyz, pose.row_1.xyz), in_normal));
 #endif
 #ifdef TEXTURE
-    v_uv = in_uv;
+    surface.uv = in_uv;
 #endif
 #ifdef ATTRIBUTE
-    v_color = in_color.rgb;
+    surface.color = in_color.rgb;
 #endif
 #ifdef WRITE_OBJECT_INDEX
-    v_object_index = uint(max(in_object_index, 0));
+    surface.object_index = uint(max(in_object_index, 0));
 #endif
 }

@@ -4,8 +4,10 @@
 from .base import Frame, Pass
 from .composite import CompositePass
 from .direct import DirectPass
+from .exit import ExitPass
 from .gbuffer import GBufferPass
+from .oracle import OraclePass
 
-PASSES: tuple[type[Pass], ...] = (GBufferPass, DirectPass, CompositePass)
+PASSES: tuple[type[Pass], ...] = (OraclePass, GBufferPass, ExitPass, DirectPass, CompositePass)
 
-__all__ = ["PASSES", "CompositePass", "DirectPass", "Frame", "GBufferPass", "Pass"]
+__all__ = ["PASSES", "Frame", "Pass"]

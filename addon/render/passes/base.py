@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What every pass is and what it may use while it runs."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
-from ...scene import Camera, RenderSettings, Scene
+from ...scene import Camera, Layering, Moment, RenderSettings, Scene
+from ...scene.correspondence import Correspondence
 from ..device import Device
+from ..draws import DrawLists
 from ..film import Film
 from ..geometry import GeometryStore
 from ..images import ImageStore
+from ..oracle_state import OracleState
 from ..plan import Plan, PlannedPass
 from ..programs import ProgramSpec
 from ..sampling import Sample
@@ -19,18 +22,49 @@ from ..uniforms import UniformBlock
 
 @dataclass
 class Frame:
-    """One view's state during one sample. `camera` already has the sample's sub-pixel jitter."""
+    """One view's state during one sample.
+
+    Cameras include the guard band. `view`: the scene's own; `camera`: the same with the sample's sub-pixel jitter.
+    `layering`: how one pass over the geometry reaches several layers. `oracle`: what its texture shows.
+    `previous`: the frame before. `history`: what a final render draws its oracle from, if not from the frame itself.
+    `ahead`: the next picture as far as it is known or predicted, None where that is the next sample.
+    `continuous`: as in `Sequence`.
+    """
 
     device: Device
     pool: TexturePool
     geometry: GeometryStore
+    draws: DrawLists
     images: ImageStore
     film: Film
+    oracle: OracleState
+    correspondence: Callable[[Scene], Correspondence]
     scene: Scene
     settings: RenderSettings
     plan: Plan
+    layering: Layering
+    view: Camera
     camera: Camera
     sample: Sample
+    previous: Moment | None
+    history: Moment | None
+    ahead: Moment | None
+    continuous: bool
+
+    @property
+    def moment(self) -> Moment:
+        """What this sample shows."""
+        return Moment(self.scene, self.camera)
+
+    def jittered(self, camera: Camera, sample: Sample) -> Camera:
+        """A camera (guard band included) as a sample sees through it."""
+        width, height = self.pool.size
+        x, y = sample.pixel_offset
+        return camera.shifted(x / width, y / height)
+
+    def begin_sample(self, sample: Sample) -> None:
+        """Go on to a sample."""
+        self.sample, self.camera = sample, self.jittered(self.view, sample)
 
 
 class Pass(Protocol):

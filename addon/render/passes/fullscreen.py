@@ -17,6 +17,7 @@ CAMERA_UNIFORMS = UniformBlock(
         ("camera_window", "vec4"),
         ("camera_resolution", "vec2"),
         ("camera_orthographic", "int"),
+        ("guard_band", "int"),  # pixels between the edges of what the camera sees and the picture
     ),
 )
 
@@ -27,6 +28,10 @@ _CHANNEL_SAMPLERS = {
     "gbuffer.material": "material_layers",
     "gbuffer.emission": "emission_layers",
     "gbuffer.object_index": "object_index_layers",
+    "gbuffer.motion": "motion_layers",
+    "exit.view_depth": "exit_view_depth_layers",
+    "exit.normal": "exit_normal_layers",
+    "exit.base_color": "exit_base_color_layers",
     "direct.radiance": "radiance_layers",
 }
 """Target -> the sampler that shaders read it through."""
@@ -55,7 +60,10 @@ def fullscreen_program(
 
 
 class FullscreenDraw:
-    """Draws one triangle over the viewport; attribute-less vertex arrays are kept per program."""
+    """Draws one triangle over the viewport; attribute-less vertex arrays are kept per program.
+
+    Shaders see the camera of the whole guarded picture, in whose pixels they address the targets.
+    """
 
     def __init__(self, device: Device, block: UniformBlock) -> None:
         self._device = device
@@ -76,6 +84,7 @@ class FullscreenDraw:
             camera_window=frame.camera.window,
             camera_resolution=frame.pool.size,
             camera_orthographic=int(frame.camera.orthographic),
+            guard_band=frame.pool.guard_band,
         )
 
     def draw(self, spec: ProgramSpec, **uniforms: object) -> None:

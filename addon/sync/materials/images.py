@@ -11,8 +11,8 @@ import bpy
 import numpy as np
 
 from ...scene import Image
-from ...scene.arrays import Float32Array, UInt8Array
-from ..changes import Messages, new_version, same_array
+from ...scene.arrays import Float32Array, UInt8Array, same_array
+from ..changes import Messages, new_version
 from ..keys import id_key
 from .graph import Node
 

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which other frames a view's pictures need, seen through cameras with the guard band."""
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+
+from ..scene import Camera, Moment, RenderSettings, Sequence, Variant
+from ..scene.extrapolation import extrapolated
+from ..scene.history import is_cut
+from .plan import Plan
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """The frames around a view; each is what the field of the same name in `Frame` says."""
+
+    view: Camera
+    previous: Moment | None
+    history: Moment | None
+    ahead: Moment | None
+
+
+def surroundings(current: Moment, sequence: Sequence, plan: Plan, settings: RenderSettings) -> Surroundings:
+    """The frames around `current` that its plan makes use of. Those of `sequence` see the same picture without guard
+    band."""
+    margin_x, margin_y = plan.guard_band / settings.width, plan.guard_band / settings.height
+
+    def guarded(moment: Moment) -> Moment:
+        camera = moment.camera
+        if plan.guard_band:
+            camera = camera.cropped(-margin_x, 1.0 + margin_x, -margin_y, 1.0 + margin_y)
+        return Moment(moment.scene, camera)
+
+    now = guarded(current)
+    previous = guarded(sequence.previous) if sequence.previous else None
+    earlier = guarded(sequence.earlier) if sequence.earlier else previous
+    history = ahead = None
+    if not sequence.continuous and previous and earlier and not is_cut(previous, now):
+        if plan.variant in (Variant.PREVIOUS, Variant.REPROJECT):
+            history = previous
+        elif plan.variant is Variant.PREDICT:
+            history = extrapolated(earlier, previous)
+    if plan.look_ahead and plan.variant is Variant.PREDICT:
+        ahead = extrapolated(previous, now) if previous and not is_cut(previous, now) else now
+    elif plan.look_ahead and sequence.following:
+        ahead = guarded(sequence.following)
+    return Surroundings(now.camera, previous, history, ahead)
+
+
+def oracle_depends_on(settings: RenderSettings, plan: Plan) -> Hashable:
+    """What the oracle's layout and contents depend on besides scene and camera."""
+    return (
+        plan.variant,
+        plan.layers,
+        plan.guard_band,
+        settings.width,
+        settings.height,
+        settings.minimum_separation,
+        settings.relative_separation,
+        settings.alpha_threshold,
+        settings.layering,
+    )
