@@ -6,11 +6,14 @@ import sys
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 SHARED_SCENES = REPOSITORY.parent / "shared" / "scenes"
 
 sys.path.append(str(REPOSITORY))
+settings.register_profile("no clock", deadline=None)  # how busy a machine is must not fail a test
+settings.load_profile("no clock")
 os.environ["LIBGL_ALWAYS_SOFTWARE"] = "1"  # reference pictures are the software rasteriser's
 
 

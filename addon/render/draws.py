@@ -9,7 +9,6 @@ import numpy as np
 
 from ..scene import BaseColorSource, ImageTexture, InstanceBatch, Material, Scene
 from .device import Device
-from .plan import is_alpha_tested, is_invisible
 from .uniforms import UniformBlock
 
 MATERIAL_UNIFORMS = UniformBlock(
@@ -99,7 +98,7 @@ def _draws(scene: Scene, alpha_threshold: float, offsets: dict[str, int]) -> Ite
     for batch in sorted(scene.batches, key=lambda batch: batch.key):
         for slot in scene.meshes[batch.mesh].slots:
             material = scene.materials[batch.materials[min(slot.slot, len(batch.materials) - 1)]]
-            if slot.count == 0 or is_invisible(material, alpha_threshold):
+            if slot.count == 0 or material.alpha < alpha_threshold:  # no fragment can pass the alpha test
                 continue
             surface = _surface_defines(material)
             texture = material.texture if "TEXTURE" in surface else None
@@ -108,7 +107,7 @@ def _draws(scene: Scene, alpha_threshold: float, offsets: dict[str, int]) -> Ite
 
 def _surface_defines(material: Material) -> frozenset[str]:
     if material.source is BaseColorSource.TEXTURE and material.texture is not None:
-        return frozenset({"TEXTURE", "ALPHA_TEST"} if is_alpha_tested(material) else {"TEXTURE"})
+        return frozenset({"TEXTURE", "ALPHA_TEST"} if material.is_alpha_tested else {"TEXTURE"})
     return frozenset({"ATTRIBUTE"} if material.source is BaseColorSource.ATTRIBUTE else ())
 
 

@@ -45,9 +45,14 @@ class GBufferChannel:
     clear: float = 0.0
     group: str = "gbuffer"
 
+    @property
+    def target_name(self) -> str:
+        """The name of the texture array that holds this channel."""
+        return f"{self.group}.{self.name}"
+
     def target(self, layers: int) -> TargetSpec:
         """The texture array that holds this channel for `layers` layers."""
-        return TargetSpec(f"{self.group}.{self.name}", self.components, self.dtype, layers, self.clear)
+        return TargetSpec(self.target_name, self.components, self.dtype, layers, self.clear)
 
 
 CHANNELS = (

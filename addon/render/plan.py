@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf
 
-from ..scene import BaseColorSource, Channel, DebugView, LightKind, Material, RenderSettings, Scene, Variant
+from ..scene import Channel, DebugView, LightKind, RenderSettings, Scene, Variant
 from .layout import CHANNELS, EXIT_CHANNELS, GBufferChannel, TargetSpec
 
 
@@ -142,31 +142,6 @@ def frames_before(settings: RenderSettings) -> int:
     return 1 if reads_motion else 0
 
 
-def is_emissive(material: Material) -> bool:
-    """Whether a material emits light."""
-    return max(material.emission) > 0.0
-
-
-def is_glossy(material: Material) -> bool:
-    """Whether a material reflects light other than diffusely."""
-    return material.specular > 0.0 or material.metallic > 0.0
-
-
-def has_glossy(scene: Scene) -> bool:
-    """Whether any material does."""
-    return any(is_glossy(material) for material in scene.materials.values())
-
-
-def is_alpha_tested(material: Material) -> bool:
-    """Whether presence varies over the surface, so that fragments must be tested one by one."""
-    return material.texture_alpha and material.source is BaseColorSource.TEXTURE
-
-
-def is_invisible(material: Material, alpha_threshold: float) -> bool:
-    """Whether no fragment of the material can pass the alpha test."""
-    return material.alpha < alpha_threshold
-
-
 def _layer_count(settings: RenderSettings, left_out: list[LeftOut]) -> int:
     if settings.deep_output:
         return settings.layers
@@ -235,7 +210,7 @@ def _plan_exit(settings: RenderSettings, layers: int, left_out: list[LeftOut]) -
 
 def _plan_direct(scene: Scene, settings: RenderSettings, layers: int, left_out: list[LeftOut]) -> PlannedPass | None:
     lit = bool(scene.lights) or max(scene.world.radiance) > 0.0
-    emissive = any(is_emissive(material) for material in scene.materials.values())
+    emissive = any(material.is_emissive for material in scene.materials.values())
     if not scene.batches:
         left_out.append(LeftOut("direct", "no geometry"))
         return None
@@ -284,9 +259,9 @@ def _direct_needs(scene: Scene) -> dict[str, tuple[bool, str]]:
         (False in bulbs, "no point or spot light without soft falloff"),
         (True in bulbs, "no point or spot light with soft falloff"),
         (LightKind.SPOT in kinds, "no spot light"),
-        (has_glossy(scene), "no glossy material"),
+        (any(material.is_glossy for material in materials), "no glossy material"),
         (max(scene.world.radiance) > 0.0, "the world is black"),
-        (any(is_emissive(material) for material in materials), "no emissive material"),
+        (any(material.is_emissive for material in materials), "no emissive material"),
     )
     return dict(zip(DIRECT_DEFINES, needed, strict=True))
 
@@ -309,7 +284,7 @@ def _read_channels(
         add((_debug_target(settings).removeprefix("gbuffer."),), min(settings.debug_layer + 1, layers))
     if settings.deep_output:
         add(("normal", "base_color", "material", "object_index"), layers)
-        if any(is_emissive(material) for material in scene.materials.values()):
+        if any(material.is_emissive for material in scene.materials.values()):
             add(("emission",), layers)
         if settings.motion_vectors:
             add(("motion",), layers)
@@ -331,7 +306,7 @@ def _plan_composite(scene: Scene, settings: RenderSettings, direct: PlannedPass 
         if settings.debug_view is DebugView.DIRECT and not direct:
             defines.remove("DEBUG_DIRECT")
     defines |= {f"FILM_{channel.value}" for channel in settings.channels & MEAN_CHANNELS}
-    if Channel.DIFFUSE_COLOR in settings.channels and has_glossy(scene):
+    if Channel.DIFFUSE_COLOR in settings.channels and any(material.is_glossy for material in scene.materials.values()):
         defines.add("SPECULAR")
     reads = {"view_depth"}.union(*(_FILM_CHANNELS[channel] for channel in settings.channels & MEAN_CHANNELS))
     targets = [f"gbuffer.{name}" for name in sorted(reads)]

@@ -10,7 +10,7 @@ from .arrays import Float64Array, Int64Array, same_array
 from .camera import Camera
 from .correspondence import same_topology
 from .geometry import InstanceBatch, Mesh
-from .materials import BaseColorSource, Material
+from .materials import Material
 from .scene import Scene
 from .sequence import Moment
 
@@ -119,16 +119,12 @@ def _instances(scene: Scene) -> dict[tuple[str, Hashable], list[InstanceBatch]]:
 
 
 def _is_pierced(scene: Scene, batch: InstanceBatch) -> bool:
-    return any(_texture_holes(scene.materials[key]) for key in batch.materials)
-
-
-def _texture_holes(material: Material) -> bool:
-    return material.texture_alpha and material.source is BaseColorSource.TEXTURE and material.texture is not None
+    return any(scene.materials[key].is_alpha_tested for key in batch.materials)
 
 
 def _holes(scene: Scene, material: Material) -> Hashable:
     """What decides where a material's surface is cut out: equal values, equal holes."""
-    if material.texture is None or not _texture_holes(material):
+    if material.texture is None or not material.is_alpha_tested:
         return material.alpha
     return material.alpha, material.texture, scene.images[material.texture.image].version
 

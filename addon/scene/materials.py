@@ -80,3 +80,18 @@ class Material:
     roughness: float = 0.5
     specular: float = 0.04
     emission: Color = (0.0, 0.0, 0.0)
+
+    @property
+    def is_emissive(self) -> bool:
+        """Whether the surface emits light."""
+        return max(self.emission) > 0.0
+
+    @property
+    def is_glossy(self) -> bool:
+        """Whether it reflects light other than diffusely."""
+        return self.specular > 0.0 or self.metallic > 0.0
+
+    @property
+    def is_alpha_tested(self) -> bool:
+        """Whether presence varies over the surface, so that fragments must be tested one by one."""
+        return self.texture_alpha and self.source is BaseColorSource.TEXTURE and self.texture is not None

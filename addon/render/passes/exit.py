@@ -30,15 +30,12 @@ class ExitPass:
     def run(self, frame: Frame, planned: PlannedPass) -> None:
         """Draw the exit of every layer, the way the layers were drawn."""
         plan = frame.plan
-        names = tuple(channel.target(1).name for channel in EXIT_CHANNELS)
+        names = tuple(channel.target_name for channel in EXIT_CHANNELS)
         program = GeometryProgram(EXIT_CHANNELS, frozenset({"EXIT"}), plan.drawn_layers, frame.layering)
         layers = frame.pool.texture("gbuffer.view_depth")
-        if plan.one_pass:
-            self._rasterizer.draw(frame, GeometryView(frame.moment, program, names, oracle=layers))
-            return
-        for layer in range(plan.layers):
-            attachments = tuple((name, layer) for name in names)
-            view = GeometryView(frame.moment, program, attachments, first_layer=layer, oracle=layers)
+        turns = (None,) if plan.one_pass else range(plan.layers)
+        for into in turns:
+            view = GeometryView(frame.moment, program, names, into, first_layer=into or 0, oracle=layers)
             self._rasterizer.draw(frame, view)
 
     def release(self) -> None:

@@ -50,7 +50,8 @@ class GBufferPass:
             view = GeometryView(
                 frame.moment,
                 program,
-                attachments=tuple((channel.target(1).name, layer) for channel in channels),
+                targets=tuple(channel.target_name for channel in channels),
+                into=layer,
                 first_layer=layer,
                 oracle=frame.pool.texture(ORACLE_TARGET) if layer > 0 else None,
                 oracle_layer_offset=layer,
@@ -71,7 +72,7 @@ class GBufferPass:
         view = GeometryView(
             frame.moment,
             GeometryProgram(channels, frozenset(defines), plan.drawn_layers, frame.layering),
-            attachments=tuple(channel.target(1).name for channel in channels),
+            targets=tuple(channel.target_name for channel in channels),
             oracle=frame.pool.texture(ORACLE_TARGET),
             oracle_offset=_jitter_between(frame, state.moment) if reprojects else (0.0, 0.0),
             oracle_drift=0.0 if exact or reprojects else pixel_drift(state.moment, frame.moment, *frame.pool.size),

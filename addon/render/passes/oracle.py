@@ -56,7 +56,8 @@ class OraclePass:
         view = GeometryView(
             moment,
             program,
-            attachments=((target, 0),),
+            targets=(target,),
+            into=0,
             first_layer=layer,
             oracle=frame.pool.texture(ORACLE_TARGET) if layer > 0 else None,
         )

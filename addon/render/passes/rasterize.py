@@ -17,7 +17,6 @@ from ..geometry import OtherTimes, split_float64
 from ..layout import CHANNELS, EXIT_CHANNELS, GBufferChannel, outputs_glsl
 from ..programs import ProgramSpec
 from ..raw_gl import CLIP_DISTANCE0
-from ..targets import Attachments
 from ..uniforms import UniformBlock
 from .base import Frame, UniformBuffer, subsets
 
@@ -109,13 +108,17 @@ class GeometryProgram:
 class GeometryView:
     """One pass over the geometry: what it sees and where it draws.
 
-    `moment`: whose geometry is drawn, through which camera. `previous`, `following`: the other frames that the program
-    needs. `attachments`: (target, layer) pairs, or whole targets where several layers are reached.
+    `moment`: whose geometry is drawn, through which camera. `targets` that the program writes: their layer `into`, or
+    all their layers where that is None. `first_layer`: which layer of the deep G-buffer comes first.
+    `oracle`: what the program tests against; that of layer k is its layer k − `oracle_layer_offset`, seen
+    `oracle_offset` pixels aside, at most `oracle_drift` pixels ago. `previous`, `following`: the other frames that the
+    program needs.
     """
 
     moment: Moment
     program: GeometryProgram
-    attachments: Attachments | tuple[str, ...]
+    targets: tuple[str, ...]
+    into: int | None = None
     first_layer: int = 0
     oracle: moderngl.TextureArray | None = None
     oracle_layer_offset: int = 1
@@ -134,14 +137,15 @@ class Rasterizer:
         self._depth = frozenset[str](() if device.zero_to_one_depth else {FRAGMENT_DEPTH})
 
     def draw(self, frame: Frame, view: GeometryView) -> None:
-        """Clear the attachments and draw every triangle of the view's scene once."""
+        """Clear the targets and draw every triangle of the view's scene once."""
         context = self._device.context
-        if isinstance(view.attachments[0], str):
-            framebuffer = frame.pool.layered_framebuffer(view.attachments)  # pyright: ignore[reportArgumentType]
+        if view.into is None:
+            frame.pool.layered_framebuffer(view.targets).use()
+            frame.pool.clear(view.targets, depth=True)
         else:
-            framebuffer = frame.pool.framebuffer(view.attachments, depth=True)  # pyright: ignore[reportArgumentType]
-        framebuffer.use()
-        frame.pool.clear(view.attachments, depth=True)
+            attachments = tuple((name, view.into) for name in view.targets)
+            frame.pool.framebuffer(attachments, depth=True).use()
+            frame.pool.clear(attachments, depth=True)
         context.enable_only(moderngl.DEPTH_TEST)
         context.depth_func = ">"
         self._bind(frame, view)
