@@ -69,7 +69,7 @@ class DeepGBufferEngine(bpy.types.RenderEngine):
         if scene.render.use_multiview:
             job.measured.warnings += (messages.STEREO,)
         if finished:
-            saved = layer_output.save(depsgraph, job.scene, job.layers)
+            saved = layer_output.save(depsgraph, job.frames, job.layers)
             job.measured.files = saved.files
             job.measured.warnings += saved.failures
         statistics.record(scene.name, list(self._layers.values()))

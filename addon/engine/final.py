@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A final render of one view layer: sync here, render on the GL thread, refine Blender's result as samples come in."""
+"""A final render of one view layer: read its frames, render on the GL thread, refine Blender's result meanwhile."""
 
 import time
 from concurrent.futures import CancelledError
@@ -8,11 +8,10 @@ from typing import Any
 
 import bpy
 
-from ..render import Device, LayerImages, Plan, Renderer
-from ..scene import Camera, Scene
+from ..render import Device, LayerImages, Plan, Renderer, frames_before
+from ..scene import Moment, Sequence
 from ..scene.arrays import Float32Array
-from ..sync import render_camera
-from . import gl_jobs, messages, passes, regions, settings
+from . import frames, gl_jobs, messages, passes, regions, settings
 from .sessions import FinalSession
 from .statistics import Measured
 
@@ -25,7 +24,7 @@ class FinalRender:
 
     def __init__(self, engine: bpy.types.RenderEngine, session: FinalSession) -> None:
         self.measured = Measured()
-        self.scene = Scene()
+        self.frames = frames.Frames()
         self.layers: tuple[LayerImages, ...] = ()
         self._engine = engine
         self._session = session
@@ -34,25 +33,25 @@ class FinalRender:
     def run(self, depsgraph: Any, samples: int | None = None) -> bool:
         """Render the view layer that `depsgraph` evaluates.
 
-        `measured`, `scene` and `layers` are filled when it returns. `samples` overrides the scene's number. Returns
+        `measured`, `frames` and `layers` are filled when it returns. `samples` overrides the scene's number. Returns
         False where the user cancelled before there was a picture; a render cancelled later keeps the samples it has.
         Raises EngineError, DeviceError, RenderError or ShaderError where there can be no picture.
         """
         engine = self._engine
-        scene = self.scene = self._sync(depsgraph)
-        camera = render_camera(depsgraph, engine.resolution_x, engine.resolution_y)
-        if camera is None:
-            raise messages.EngineError(messages.no_camera(depsgraph.scene.name))
         result = engine.begin_result(0, 0, engine.resolution_x, engine.resolution_y, layer=depsgraph.view_layer.name)
         finished = False
         try:
             wanted = passes.requested(depsgraph.view_layer)
             channels = frozenset(item.channel for item in wanted)
             width, height = result.resolution_x, result.resolution_y
-            camera = camera.cropped(*regions.final_border(depsgraph.scene.render, engine, width, height))
+            border = regions.final_border(depsgraph.scene.render, engine, width, height)
             how = settings.final(depsgraph.scene, width, height, channels, samples)
             with suppress(CancelledError):
-                finished = self._render(scene, camera, how, result, wanted)
+                self._read(depsgraph, frames_before(how.render))
+                now = self.frames.current.moment(border)
+                if now is None:
+                    raise messages.EngineError(messages.no_camera(depsgraph.scene.name))
+                finished = self._render(now, self.frames.sequence(border), how, result, wanted)
         finally:
             engine.end_result(result, cancel=not finished)
         self.measured.total_s = self._elapsed()
@@ -61,17 +60,18 @@ class FinalRender:
     def _elapsed(self) -> float:
         return time.perf_counter() - self._start
 
-    def _sync(self, depsgraph: Any) -> Scene:
+    def _read(self, depsgraph: Any, before: int) -> None:
+        """Read the frame to render and those before it that it needs."""
         self._engine.update_stats("", "Reading the scene")
-        synced = self._session.mirror.sync(depsgraph)
+        mirror = self._session.mirror
+        self.frames = frames.read(self._engine, depsgraph, mirror, before, self._engine.test_break)
         self.measured.sync_s = self._elapsed()
-        self.measured.warnings = synced.warnings
-        return synced.scene
+        self.measured.warnings = self.frames.current.warnings
 
     def _render(
         self,
-        scene: Scene,
-        camera: Camera,
+        now: Moment,
+        sequence: Sequence,
         how: settings.FinalSettings,
         result: bpy.types.RenderResult,
         wanted: tuple[passes.OutputPass, ...],
@@ -81,7 +81,7 @@ class FinalRender:
 
         def begin(device: Device) -> tuple[Renderer, Plan]:
             renderer = self._session.renderer_on(device)
-            return renderer, renderer.begin(scene, camera, how.render)
+            return renderer, renderer.begin(now.scene, now.camera, how.render, sequence)
 
         renderer, plan = gl_jobs.run(begin, self._engine.test_break)
         with suppress(CancelledError):

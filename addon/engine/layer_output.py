@@ -10,8 +10,9 @@ import bpy
 
 from .. import output
 from ..render import LayerImages
-from ..scene import Scene, snapshot
+from ..scene import snapshot
 from . import messages
+from .frames import Frames
 
 
 class Saved(NamedTuple):
@@ -21,13 +22,14 @@ class Saved(NamedTuple):
     failures: tuple[str, ...]
 
 
-def save(depsgraph: Any, scene: Scene, layers: Sequence[LayerImages]) -> Saved:
+def save(depsgraph: Any, frames: Frames, layers: Sequence[LayerImages]) -> Saved:
     """Write the files that the scene asks for."""
+    scenes = [frame.scene for frame in (frames.current, *frames.before)]
     ours = depsgraph.scene.deep_gbuffer
     wanted: tuple[tuple[bool, str, str, Callable[[Path], None]], ...] = (
         (ours.save_layers, "layers", "layers.exr", lambda path: output.write_layers(path, layers)),
         (ours.save_deep, "deep samples", "deep.exr", lambda path: output.write_deep(path, layers)),
-        (ours.save_snapshot, "scene snapshot", "snapshot.npz", lambda path: snapshot.save(path, scene)),
+        (ours.save_snapshot, "scene snapshot", "snapshot.npz", lambda path: snapshot.save(path, *scenes)),
     )
     files: list[str] = []
     failures: list[str] = []

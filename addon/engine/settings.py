@@ -2,9 +2,25 @@
 """Blender's and our scene properties as frozen values."""
 
 from dataclasses import dataclass
+from enum import StrEnum
+from math import ceil
 from typing import Any
 
-from ..scene import Channel, DebugView, RenderSettings
+from ..scene import Channel, DebugView, RenderSettings, Variant
+
+
+class SeparationUnit(StrEnum):
+    """What the minimum separation is measured in: metres, or the nearer layer's view depth."""
+
+    DISTANCE = "DISTANCE"
+    RELATIVE = "RELATIVE"
+
+
+class GuardBandUnit(StrEnum):
+    """What the guard band is measured in: pixels, or percent of the picture's longer side."""
+
+    PIXELS = "PIXELS"
+    PERCENT = "PERCENT"
 
 
 @dataclass(frozen=True)
@@ -15,20 +31,6 @@ class FinalSettings:
     time_limit: float
 
 
-def _common(scene: Any) -> dict[str, Any]:
-    """What the final render and the viewport share."""
-    ours = scene.deep_gbuffer
-    return {
-        "layers": ours.layers,
-        "minimum_separation": ours.minimum_separation,
-        "filter_radius": scene.render.filter_size,
-        "transparent_film": scene.render.film_transparent,
-        "debug_view": DebugView(ours.debug_view),
-        "debug_layer": min(ours.debug_layer, ours.layers) - 1,
-        "seed": ours.seed,
-    }
-
-
 def final(
     scene: Any, width: int, height: int, channels: frozenset[Channel], samples: int | None = None
 ) -> FinalSettings:
@@ -37,17 +39,50 @@ def final(
     `samples` overrides the scene's number, for previews: they write no layers either.
     """
     ours = scene.deep_gbuffer
+    writes_files = samples is None
+    writes_layers = writes_files and ours.save_layers
+    deep_output = writes_layers or (writes_files and ours.save_deep)
     render = RenderSettings(
         width=width,
         height=height,
         samples=samples or ours.samples,
         channels=channels,
-        deep_output=samples is None and (ours.save_layers or ours.save_deep),
-        **_common(scene),
+        deep_output=deep_output,
+        motion_vectors=writes_layers and ours.save_motion,
+        exit_surfaces=deep_output and ours.save_exit,
+        **_common(scene, width, height),
     )
     return FinalSettings(render, ours.time_limit)
 
 
 def viewport(scene: Any, width: int, height: int) -> RenderSettings:
     """Settings of a viewport of `width` x `height` pixels."""
-    return RenderSettings(width=width, height=height, samples=scene.deep_gbuffer.viewport_samples, **_common(scene))
+    samples = scene.deep_gbuffer.viewport_samples
+    return RenderSettings(width=width, height=height, samples=samples, **_common(scene, width, height))
+
+
+def _common(scene: Any, width: int, height: int) -> dict[str, Any]:
+    """What the final render and the viewport share."""
+    ours = scene.deep_gbuffer
+    relative = ours.separation_unit == SeparationUnit.RELATIVE
+    return {
+        "layers": ours.layers,
+        "minimum_separation": ours.relative_separation if relative else ours.minimum_separation,
+        "relative_separation": relative,
+        "variant": Variant(ours.variant),
+        "guard_band": _guard_band(ours, width, height),
+        "filter_radius": scene.render.filter_size,
+        "transparent_film": scene.render.film_transparent,
+        "debug_view": DebugView(ours.debug_view),
+        "debug_layer": min(ours.debug_layer, ours.layers) - 1,
+        "seed": ours.seed,
+    }
+
+
+def _guard_band(ours: Any, width: int, height: int) -> int:
+    """Pixels a side around a picture of `width` x `height` pixels."""
+    if not ours.use_guard_band:
+        return 0
+    if ours.guard_band_unit == GuardBandUnit.PIXELS:
+        return ours.guard_band_pixels
+    return ceil(max(width, height) * ours.guard_band_percent / 100.0)

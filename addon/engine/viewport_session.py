@@ -10,10 +10,8 @@ import time
 from concurrent.futures import Future
 from dataclasses import dataclass
 
-import numpy as np
-
-from ..render import Device, DeviceError, GLThread, Renderer, RenderError, ShaderError, gl_thread
-from ..scene import Camera, Channel, RenderSettings, Scene
+from ..render import Device, DeviceError, GLThread, Plan, Renderer, RenderError, ShaderError, gl_thread
+from ..scene import Camera, Channel, Moment, RenderSettings, Scene, Sequence, Variant
 from ..scene.arrays import Float32Array
 from . import messages
 
@@ -24,6 +22,9 @@ READ_SECONDS = 0.1
 
 ALWAYS_SHOWN = 2
 
+GUIDED_BY_HISTORY = frozenset({Variant.PREVIOUS, Variant.PREDICT, Variant.REPROJECT})
+"""Variants whose pictures of anything that moves are approximate."""
+
 
 @dataclass(frozen=True)
 class View:
@@ -32,6 +33,49 @@ class View:
     scene: Scene
     camera: Camera
     settings: RenderSettings
+
+    @property
+    def moment(self) -> Moment:
+        """The scene and the camera that sees it."""
+        return Moment(self.scene, self.camera)
+
+
+@dataclass(frozen=True)
+class Begun:
+    """The view that the renderer draws, by which plan, after which view, and the one that it looks ahead to."""
+
+    view: View
+    plan: Plan
+    after: View | None
+    ahead: View | None
+
+    @property
+    def approximate(self) -> bool:
+        """Whether its first picture is guided by one of another view."""
+        return self.plan.variant in GUIDED_BY_HISTORY and self.after is not None and self.after is not self.view
+
+    def step_towards(self, newest: View) -> "Step | None":
+        """What to begin next; None to go on with what is begun.
+
+        With Delay, a picture draws the depth that the next one needs. So the view that is shown is drawn again when
+        a newer one becomes known, looking ahead to it; a view that was looked ahead to is then never left out.
+        With variants that history guides, a view is drawn again when no newer one follows: at rest they are exact.
+        """
+        if self.view is newest:
+            return Step(newest) if self.approximate else None
+        if self.plan.variant is not Variant.DELAY or self.view.settings != newest.settings:
+            return Step(newest)
+        if self.ahead is None:
+            return Step(self.view, newest)
+        return Step(self.ahead, None if self.ahead is newest else newest)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A view to begin, and the one to look ahead to from there."""
+
+    view: View
+    ahead: View | None = None
 
 
 @dataclass(frozen=True)
@@ -48,16 +92,6 @@ class Picture:
         return self.samples >= self.view.settings.samples
 
 
-def same_camera(first: Camera, second: Camera) -> bool:
-    """Whether two cameras make the same picture."""
-    return np.array_equal(first.world_from_camera, second.world_from_camera) and (
-        first.window,
-        first.clip_start,
-        first.clip_end,
-        first.orthographic,
-    ) == (second.window, second.clip_start, second.clip_end, second.orthographic)
-
-
 class ViewportSession:
     """Blender's thread calls `show` and `close` and reads `picture` and `error`; jobs run on the GL thread."""
 
@@ -72,7 +106,7 @@ class ViewportSession:
         self._thread: GLThread
         # Only the GL thread touches these.
         self._renderer: Renderer | None = None
-        self._begun: View | None = None
+        self._begun: Begun | None = None
         self._attempted: View | None = None
         self._read_at = 0.0
 
@@ -100,12 +134,7 @@ class ViewportSession:
         """Render this view from now on; where it is what is already shown, go on refining. Never waits."""
         with self._lock:
             view = self._view
-            if (
-                view is not None
-                and view.scene is scene
-                and view.settings == settings
-                and same_camera(view.camera, camera)
-            ):
+            if view is not None and view.scene is scene and view.settings == settings and view.camera.sees_as(camera):
                 return
             self._view = View(scene, camera, settings)
             self._error = None
@@ -127,16 +156,15 @@ class ViewportSession:
             thread.submit(self._render).add_done_callback(self._rendered)
 
     def _render(self, device: Device) -> bool:
-        """One job: one more sample of the newest view. Returns whether it needs more."""
-        view = self._attempted = self._view
-        if view is None:
+        """One job: one more sample of the newest view, or of one on the way to it. Returns whether more is to come."""
+        newest = self._attempted = self._view
+        if newest is None:
             return False
         if self._renderer is None:
             self._renderer = Renderer(device)
-        if view is not self._begun:
-            self._begun = None
-            self._renderer.begin(view.scene, view.camera, view.settings)
-            self._begun = view
+        begun, self._begun = self._begun, None  # where anything fails, the last picture is no history
+        begun = _proceed(self._renderer, begun, newest)
+        view = begun.view
         samples = self._renderer.render_sample()
         device.context.finish()  # else a fast thread would queue samples of views long gone
         complete = samples >= view.settings.samples
@@ -144,7 +172,8 @@ class ViewportSession:
             self._picture = Picture(self._renderer.read(Channel.COMBINED), view, samples)
             self._revision += 1
             self._read_at = time.monotonic()
-        return not complete
+        self._begun = begun
+        return begun.step_towards(newest) is not None or not complete
 
     def _rendered(self, future: "Future[bool]") -> None:
         """Go on with the next sample or the next view; runs on the GL thread."""
@@ -167,6 +196,24 @@ class ViewportSession:
         if self._renderer is not None:
             self._renderer.release()
             self._renderer = None
+
+
+def _proceed(renderer: Renderer, last: Begun | None, newest: View) -> Begun:
+    """Begin what comes next on the way to `newest`, if that is not begun already; returns what is begun then.
+
+    The picture of the `last` view is history where the settings are the same.
+    """
+    if last is None:
+        step = Step(newest)
+    else:
+        step = last.step_towards(newest)
+        if step is None:
+            return last
+    view, ahead = step.view, step.ahead
+    after = last.view if last and last.view.settings == view.settings else None
+    previous, following = after.moment if after else None, ahead.moment if ahead else None
+    sequence = Sequence(previous=previous, following=following, continuous=True)
+    return Begun(view, renderer.begin(view.scene, view.camera, view.settings, sequence), after, ahead)
 
 
 def _readable(error: BaseException) -> str:

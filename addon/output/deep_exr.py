@@ -15,11 +15,14 @@ from .layers_exr import Layer
 def write_deep(path: Path, layers: Sequence[Layer]) -> None:
     """Write depth Z and premultiplied RGBA (A = 1, surfaces are opaque) of every layer that is there, front to back.
 
-    A pixel has as many samples as layers that are not empty there. Raises OSError.
+    A pixel has as many samples as layers that are not empty there. Where exit surfaces were rendered, a sample reaches
+    from its surface to the exit (ZBack; the surface again where there is none). Raises OSError.
     """
     present = np.isfinite(np.stack([top_down(layer.depth) for layer in layers], axis=-1))
     counts = present.sum(axis=-1, dtype=np.int32)
     planes: dict[str, list[Float32Array]] = {"Z": [layer.depth for layer in layers]}
+    if any(layer.exit_depth is not None for layer in layers):
+        planes["ZBack"] = [_back(layer) for layer in layers]
     planes |= {letter: [layer.radiance[..., index] for layer in layers] for index, letter in enumerate("RGB")}
     planes["A"] = [np.ones_like(layer.depth) for layer in layers]
     channels = {
@@ -28,6 +31,13 @@ def write_deep(path: Path, layers: Sequence[Layer]) -> None:
     }
     header = {"type": OpenEXR.deepscanline, "compression": OpenEXR.ZIPS_COMPRESSION}
     write_atomically(path, header, channels)
+
+
+def _back(layer: Layer) -> Float32Array:
+    """View depth (H, W) at which a layer's samples end."""
+    if layer.exit_depth is None:
+        return layer.depth
+    return np.where(np.isfinite(layer.exit_depth), layer.exit_depth, layer.depth)
 
 
 def _per_pixel(samples: Float32Array, counts: Int32Array) -> np.ndarray:

@@ -12,9 +12,11 @@ from .exr import write_channels
 
 
 class Layer(Protocol):
-    """One layer of a deep G-buffer: (H, W) or (H, W, 3) float32, row 0 at the bottom.
+    """One layer of a deep G-buffer: (H, W) or (H, W, C) float32, row 0 at the bottom.
 
     `depth` is view depth in metres, +inf where the layer is empty; radiance is scene-linear, normals world-space.
+    `motion` is pixels since the previous frame (x right, y up); `exit_depth` is +inf where nothing is left again.
+    Motion and exit surfaces are None where they were not rendered.
     """
 
     @property
@@ -33,9 +35,18 @@ class Layer(Protocol):
     def emission(self) -> Float32Array: ...
     @property
     def object_index(self) -> Float32Array: ...
+    @property
+    def motion(self) -> Float32Array | None: ...
+    @property
+    def exit_depth(self) -> Float32Array | None: ...
+    @property
+    def exit_normal(self) -> Float32Array | None: ...
+    @property
+    def exit_albedo(self) -> Float32Array | None: ...
 
 
 CHANNELS = (
+    ("Depth", "depth", "Z"),
     ("Radiance", "radiance", "RGB"),
     ("Normal", "normal", "XYZ"),
     ("Albedo", "albedo", "RGB"),
@@ -43,7 +54,15 @@ CHANNELS = (
     ("Roughness", "roughness", "V"),
     ("Emission", "emission", "RGB"),
     ("ObjectIndex", "object_index", "X"),
+    ("Motion", "motion", "XYZ"),
+    ("ExitDepth", "exit_depth", "Z"),
+    ("ExitNormal", "exit_normal", "XYZ"),
+    ("ExitAlbedo", "exit_albedo", "RGB"),
 )
+"""Pass, attribute, and a letter per channel; channels that an image lacks are 0: Blender 5 reads no pass of two."""
+
+EMPTY_DEPTH = np.float32(1e10)
+"""Depth where there is nothing, as in Blender's own Depth pass."""
 
 
 def write_layers(path: Path, layers: Sequence[Layer]) -> None:
@@ -54,11 +73,13 @@ def write_layers(path: Path, layers: Sequence[Layer]) -> None:
     """
     channels: dict[str, Float32Array] = {}
     for index, layer in enumerate(layers):
-        depth = np.where(np.isfinite(layer.depth), layer.depth, np.float32(1e10)).astype(np.float32)
-        channels[f"layer{index}.Depth.Z"] = depth
         for name, attribute, letters in CHANNELS:
-            image = getattr(layer, attribute)
-            planes = image[..., None] if image.ndim == 2 else image
-            for channel, letter in enumerate(letters):
-                channels[f"layer{index}.{name}.{letter}"] = planes[..., channel]
+            image: Float32Array | None = getattr(layer, attribute)
+            if image is None:
+                continue
+            if letters == "Z":
+                image = np.where(np.isfinite(image), image, EMPTY_DEPTH)
+            planes = dict(zip(letters, np.moveaxis(np.atleast_3d(image), -1, 0), strict=False))
+            for letter in letters:
+                channels[f"layer{index}.{name}.{letter}"] = planes.get(letter, np.zeros_like(layer.depth))
     write_channels(path, channels)

@@ -1,45 +1,57 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the oracle texture shows, from one picture to the next."""
+"""What the oracle's textures show, from one picture to the next."""
 
 from collections.abc import Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
-from ..scene import Camera, Moment
+from ..scene import Moment
+from .plan import HISTORY_TARGET, ORACLE_TARGET
+
+
+@dataclass(frozen=True)
+class ShownLayers:
+    """Whose layers a texture shows, through the camera with its jitter, and how many of them, nearest first."""
+
+    moment: Moment
+    layers: int
 
 
 @dataclass
 class OracleState:
-    """`moment`: the scene, and the camera with its jitter, whose layers the oracle texture shows; None for nothing.
-    `layers`: how many of them. `view`: the same camera before jitter.
-    `valid_for`: what the texture's layout and contents depend on besides.
+    """`targets`: what each texture shows, by name. `source`: the one that this sample's layers are tested against.
+    `valid_for`: what layout and contents depend on besides.
     """
 
-    moment: Moment | None = None
-    view: Camera | None = None
-    layers: int = 0
+    targets: dict[str, ShownLayers] = field(default_factory=dict[str, ShownLayers])
+    source: str = ORACLE_TARGET
     valid_for: Hashable = None
 
     def begin(self, valid_for: Hashable, *, continuous: bool) -> None:
         """Forget what an earlier picture left, unless this one continues it with the same settings."""
         if not continuous or valid_for != self.valid_for:
-            self.forget()
+            self.targets.clear()
         self.valid_for = valid_for
 
-    def forget(self) -> None:
-        """Nothing is known."""
-        self.moment, self.view, self.layers = None, None, 0
+    @property
+    def history(self) -> Moment | None:
+        """What the last view left."""
+        shown = self.targets.get(HISTORY_TARGET)
+        return shown.moment if shown else None
 
-    def show(self, moment: Moment, view: Camera, layers: int) -> None:
-        """The texture shows this now."""
-        self.moment, self.view, self.layers = moment, view, layers
+    @property
+    def shown(self) -> ShownLayers:
+        """What the source shows."""
+        return self.targets[self.source]
 
-    def shows(self, moment: Moment) -> bool:
-        """Whether the texture shows exactly this."""
-        held = self.moment
-        return held is not None and held.scene is moment.scene and held.camera.sees_as(moment.camera)
+    def show(self, target: str, moment: Moment, layers: int) -> None:
+        """A texture shows this now."""
+        self.targets[target] = ShownLayers(moment, layers)
 
-    def has_moved(self, moment: Moment) -> bool:
-        """Whether anything but the sub-pixel jitter differs between what the texture shows and an unjittered moment."""
-        assert self.moment is not None
-        assert self.view is not None
-        return self.moment.scene is not moment.scene or not self.view.sees_as(moment.camera)
+    def complete(self, layers: int) -> None:
+        """The source has all its layers now."""
+        self.targets[self.source] = replace(self.shown, layers=layers)
+
+    def shows(self, target: str, moment: Moment) -> bool:
+        """Whether a texture shows exactly this."""
+        held = self.targets.get(target)
+        return held is not None and held.moment.scene is moment.scene and held.moment.camera.sees_as(moment.camera)

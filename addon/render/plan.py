@@ -122,7 +122,7 @@ def plan(scene: Scene, settings: RenderSettings, *, continuous: bool = False) ->
         ),
     )
     passes = [
-        *_plan_oracle(variant, layers, left_out),
+        *_plan_oracle(variant, layers, left_out, continuous=continuous),
         gbuffer,
         *_plan_exit(settings, layers + look_ahead if one_pass else layers, left_out),
         *((direct,) if direct else ()),
@@ -161,6 +161,9 @@ def _layer_count(settings: RenderSettings, left_out: list[LeftOut]) -> int:
 ORACLE_TARGET = "gbuffer.oracle"
 """View depth of the layers that the next ones are tested against."""
 
+HISTORY_TARGET = "gbuffer.history"
+"""The same, as a viewport's last view left it for the next one."""
+
 ORACLE_SCRATCH = "gbuffer.oracle_scratch"
 """A layer of the oracle while it is drawn: OpenGL 4.1 forbids reading any layer of an attached array."""
 
@@ -172,15 +175,21 @@ def _looks_ahead(variant: Variant, settings: RenderSettings, *, continuous: bool
     return variant is Variant.PREDICT and continuous
 
 
-def _plan_oracle(variant: Variant, layers: int, left_out: list[LeftOut]) -> tuple[PlannedPass, ...]:
+def _plan_oracle(
+    variant: Variant, layers: int, left_out: list[LeftOut], *, continuous: bool
+) -> tuple[PlannedPass, ...]:
     if layers == 1:
         left_out.append(LeftOut("oracle", "only one layer is built"))
         return ()
     if variant is Variant.TWO_PASS:
         left_out.append(LeftOut("oracle", "Two-Pass draws each layer before the next one is tested against it"))
         return ()
-    scratch = (TargetSpec(ORACLE_SCRATCH, 1, "f4", 1, inf),) if layers > 2 else ()
-    return (PlannedPass("oracle", writes=(TargetSpec(ORACLE_TARGET, 1, "f4", layers - 1, inf), *scratch)),)
+    writes = [TargetSpec(ORACLE_TARGET, 1, "f4", layers - 1, inf)]
+    if continuous and variant is not Variant.PREPASS:
+        writes.append(TargetSpec(HISTORY_TARGET, 1, "f4", layers - 1, inf))
+    if layers > 2:
+        writes.append(TargetSpec(ORACLE_SCRATCH, 1, "f4", 1, inf))
+    return (PlannedPass("oracle", writes=tuple(writes)),)
 
 
 def _plan_guard_band(settings: RenderSettings, variant: Variant, left_out: list[LeftOut]) -> int:

@@ -153,7 +153,7 @@ class Renderer:
         self._images.release()
         self._geometry.release()
         self._pool.release()
-        self._oracle.forget()
+        self._oracle = OracleState()
         self._correspondences.clear()
         self._timers.forget()
         self._frame = None

@@ -42,7 +42,7 @@ def surroundings(current: Moment, sequence: Sequence, plan: Plan, settings: Rend
             history = extrapolated(earlier, previous)
     if plan.look_ahead and plan.variant is Variant.PREDICT:
         ahead = extrapolated(previous, now) if previous and not is_cut(previous, now) else now
-    elif plan.look_ahead and sequence.following:
+    elif plan.look_ahead and sequence.continuous and sequence.following:
         ahead = guarded(sequence.following)
     return Surroundings(now.camera, previous, history, ahead)
 

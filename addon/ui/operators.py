@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators: statistics to the clipboard, sampling presets."""
+"""Operators: statistics to the clipboard, presets."""
 
 import json
 from typing import Any, ClassVar
@@ -9,7 +9,8 @@ from bl_operators.presets import AddPresetBase
 
 from ..engine import statistics
 
-PRESET_FOLDER = "deep_gbuffer/sampling"
+SAMPLING_PRESETS = "deep_gbuffer/sampling"
+LAYERS_PRESETS = "deep_gbuffer/layers"
 
 
 class DEEP_GBUFFER_OT_copy_statistics(bpy.types.Operator):
@@ -29,14 +30,19 @@ class DEEP_GBUFFER_OT_copy_statistics(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class DEEP_GBUFFER_OT_sampling_preset_add(AddPresetBase, bpy.types.Operator):  # pyright: ignore[reportIncompatibleMethodOverride]
+class _PresetAdd(AddPresetBase):
+    """A preset of some of our settings."""
+
+    preset_defines: ClassVar[list[str]] = ["settings = bpy.context.scene.deep_gbuffer"]
+
+
+class DEEP_GBUFFER_OT_sampling_preset_add(_PresetAdd, bpy.types.Operator):  # pyright: ignore[reportIncompatibleMethodOverride]
     """Add or remove a sampling preset"""
 
     bl_idname = "deep_gbuffer.sampling_preset_add"
     bl_label = "Add Sampling Preset"
     preset_menu = "DEEP_GBUFFER_PT_sampling_presets"
-    preset_subdir = PRESET_FOLDER
-    preset_defines: ClassVar[list[str]] = ["settings = bpy.context.scene.deep_gbuffer"]
+    preset_subdir = SAMPLING_PRESETS
     preset_values: ClassVar[list[str]] = [
         "settings.samples",
         "settings.viewport_samples",
@@ -44,4 +50,28 @@ class DEEP_GBUFFER_OT_sampling_preset_add(AddPresetBase, bpy.types.Operator):  #
     ]
 
 
-CLASSES = (DEEP_GBUFFER_OT_copy_statistics, DEEP_GBUFFER_OT_sampling_preset_add)
+class DEEP_GBUFFER_OT_layers_preset_add(_PresetAdd, bpy.types.Operator):  # pyright: ignore[reportIncompatibleMethodOverride]
+    """Add or remove a deep G-buffer preset"""
+
+    bl_idname = "deep_gbuffer.layers_preset_add"
+    bl_label = "Add Deep G-Buffer Preset"
+    preset_menu = "DEEP_GBUFFER_PT_layers_presets"
+    preset_subdir = LAYERS_PRESETS
+    preset_values: ClassVar[list[str]] = [
+        "settings.layers",
+        "settings.variant",
+        "settings.separation_unit",
+        "settings.minimum_separation",
+        "settings.relative_separation",
+        "settings.use_guard_band",
+        "settings.guard_band_unit",
+        "settings.guard_band_pixels",
+        "settings.guard_band_percent",
+    ]
+
+
+CLASSES = (
+    DEEP_GBUFFER_OT_copy_statistics,
+    DEEP_GBUFFER_OT_sampling_preset_add,
+    DEEP_GBUFFER_OT_layers_preset_add,
+)

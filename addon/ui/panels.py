@@ -7,7 +7,15 @@ import bpy
 from bl_ui.utils import PresetPanel
 
 from ..engine import passes, statistics
-from .operators import PRESET_FOLDER, DEEP_GBUFFER_OT_copy_statistics, DEEP_GBUFFER_OT_sampling_preset_add
+from ..engine.settings import GuardBandUnit, SeparationUnit
+from ..scene import Variant
+from .operators import (
+    LAYERS_PRESETS,
+    SAMPLING_PRESETS,
+    DEEP_GBUFFER_OT_copy_statistics,
+    DEEP_GBUFFER_OT_layers_preset_add,
+    DEEP_GBUFFER_OT_sampling_preset_add,
+)
 
 CLOSED: Any = {"DEFAULT_CLOSED"}
 """Panels that start folded."""
@@ -37,7 +45,7 @@ class DEEP_GBUFFER_PT_sampling_presets(PresetPanel, bpy.types.Panel):
     """Presets of the Sampling panel."""
 
     bl_label = "Sampling Presets"
-    preset_subdir = PRESET_FOLDER
+    preset_subdir = SAMPLING_PRESETS
     preset_operator = "script.execute_preset"
     preset_add_operator = DEEP_GBUFFER_OT_sampling_preset_add.bl_idname
 
@@ -62,19 +70,63 @@ class DEEP_GBUFFER_PT_sampling(_EnginePanel, bpy.types.Panel):
         column.prop(settings, "seed")
 
 
+class DEEP_GBUFFER_PT_layers_presets(PresetPanel, bpy.types.Panel):
+    """Presets of the Deep G-Buffer panel."""
+
+    bl_label = "Deep G-Buffer Presets"
+    preset_subdir = LAYERS_PRESETS
+    preset_operator = "script.execute_preset"
+    preset_add_operator = DEEP_GBUFFER_OT_layers_preset_add.bl_idname
+
+
 class DEEP_GBUFFER_PT_layers(_EnginePanel, bpy.types.Panel):
     """The deep G-buffer itself."""
 
     bl_label = "Deep G-Buffer"
 
+    def draw_header_preset(self, context: Any) -> None:
+        """The presets menu."""
+        DEEP_GBUFFER_PT_layers_presets.draw_panel_header(self.layout)
+
     def draw(self, context: Any) -> None:
-        """Layers and their separation."""
+        """Layers, how they are found, and their separation."""
         settings = context.scene.deep_gbuffer
         column = self._column()
         column.prop(settings, "layers")
-        separation = column.column()
-        separation.active = settings.layers > 1
-        separation.prop(settings, "minimum_separation")
+        several = column.column()
+        several.active = settings.layers > 1
+        several.prop(settings, "variant")
+        several.prop(settings, "separation_unit")
+        relative = settings.separation_unit == SeparationUnit.RELATIVE
+        several.prop(settings, "relative_separation" if relative else "minimum_separation", text="Minimum")
+
+
+class DEEP_GBUFFER_PT_guard_band(_EnginePanel, bpy.types.Panel):
+    """What is rendered past the picture's edge."""
+
+    bl_label = "Guard Band"
+    bl_parent_id = "DEEP_GBUFFER_PT_layers"
+    bl_options = CLOSED
+
+    def draw_header(self, context: Any) -> None:
+        """The switch."""
+        settings = context.scene.deep_gbuffer
+        self.layout.active = _reads_past_the_edge(settings)
+        self.layout.prop(settings, "use_guard_band", text="")
+
+    def draw(self, context: Any) -> None:
+        """Its width."""
+        settings = context.scene.deep_gbuffer
+        column = self._column()
+        column.active = settings.use_guard_band and _reads_past_the_edge(settings)
+        column.prop(settings, "guard_band_unit")
+        percent = settings.guard_band_unit == GuardBandUnit.PERCENT
+        column.prop(settings, "guard_band_percent" if percent else "guard_band_pixels")
+
+
+def _reads_past_the_edge(settings: Any) -> bool:
+    """Whether anything that is switched on reads the guard band."""
+    return settings.layers > 1 and settings.variant == Variant.REPROJECT
 
 
 class DEEP_GBUFFER_PT_film(_EnginePanel, bpy.types.Panel):
@@ -118,6 +170,12 @@ class DEEP_GBUFFER_PT_layer_output(_EnginePanel, bpy.types.Panel):
         settings = context.scene.deep_gbuffer
         column = self._column()
         column.prop(settings, "save_layers")
+        motion = column.column()
+        motion.active = settings.save_layers
+        motion.prop(settings, "save_motion")
+        exits = column.column()
+        exits.active = settings.save_layers or settings.save_deep
+        exits.prop(settings, "save_exit")
         column.prop(settings, "save_deep")
         column.prop(settings, "save_snapshot")
         path = column.column()
@@ -183,7 +241,9 @@ def _table(layout: Any, title: str, rows: list[tuple[str, str]]) -> None:
 CLASSES = (
     DEEP_GBUFFER_PT_sampling_presets,
     DEEP_GBUFFER_PT_sampling,
+    DEEP_GBUFFER_PT_layers_presets,
     DEEP_GBUFFER_PT_layers,
+    DEEP_GBUFFER_PT_guard_band,
     DEEP_GBUFFER_PT_film,
     DEEP_GBUFFER_PT_debug_view,
     DEEP_GBUFFER_PT_statistics,

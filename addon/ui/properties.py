@@ -7,7 +7,8 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..engine import viewport
-from ..scene import DebugView
+from ..engine.settings import GuardBandUnit, SeparationUnit
+from ..scene import DebugView, Variant
 from ..scene.settings import MAXIMUM_LAYERS
 
 _SCENE: Any = bpy.types.Scene  # takes properties that its type does not name
@@ -21,6 +22,66 @@ DEBUG_ITEMS = [
     (DebugView.EMISSION.value, "Emission", "Radiance that the surface itself emits"),
     (DebugView.OBJECT_INDEX.value, "Object Index", "Pass index of the object"),
     (DebugView.DIRECT.value, "Direct Light", "Light that reaches the layer straight from lights and world"),
+    (
+        DebugView.MOTION.value,
+        "Motion",
+        "Movement since the previous frame: gray at rest, redder to the right, greener upwards",
+    ),
+    (
+        DebugView.EXIT_DEPTH.value,
+        "Exit Depth",
+        "Distance from the camera plane where the view leaves the object again",
+    ),
+    (DebugView.EXIT_NORMAL.value, "Exit Normal", "World-space normal of the surface through which the view leaves"),
+    (DebugView.EXIT_ALBEDO.value, "Exit Albedo", "Base color of the surface through which the view leaves"),
+]
+VARIANT_ITEMS = [
+    (
+        Variant.TWO_PASS.value,
+        "Two-Pass",
+        "Draw the whole scene once per layer. Always exact; scenes with many polygons take longest",
+    ),
+    (
+        Variant.PREPASS.value,
+        "Prepass",
+        "Draw the scene's depth first, then all layers at once. Always exact; the depth costs an extra, plainer pass",
+    ),
+    (
+        Variant.DELAY.value,
+        "Delay",
+        "Draw the next picture's depth along with each picture, then all layers at once. Always exact; viewports "
+        "show every change one picture late, final renders do not",
+    ),
+    (
+        Variant.PREVIOUS.value,
+        "Previous",
+        "Draw all layers at once, guided by the previous frame's depth at the same pixel. Cheap, and exact at rest; "
+        "around anything that moves, hidden layers miss surfaces or hold some that are too close",
+    ),
+    (
+        Variant.PREDICT.value,
+        "Predict",
+        "Draw all layers at once, guided by where the last two frames suggest that everything is now. Exact for "
+        "steady motion; sudden changes put errors into hidden layers for a frame",
+    ),
+    (
+        Variant.REPROJECT.value,
+        "Reproject",
+        "Draw all layers at once, comparing each surface with the previous frame where it was then. Follows any "
+        "motion; small errors remain where surfaces come into view, and at the picture's edge without a guard band",
+    ),
+]
+SEPARATION_ITEMS = [
+    (SeparationUnit.DISTANCE.value, "Distance", "The same distance everywhere"),
+    (
+        SeparationUnit.RELATIVE.value,
+        "Relative to Depth",
+        "A fraction of the distance from the camera, for scenes that reach from near to far",
+    ),
+]
+GUARD_BAND_ITEMS = [
+    (GuardBandUnit.PIXELS.value, "Pixels", "The same number of pixels whatever the picture's size"),
+    (GuardBandUnit.PERCENT.value, "Percent", "A share of the picture's longer side"),
 ]
 
 
@@ -75,6 +136,20 @@ class DeepGBufferSettings(bpy.types.PropertyGroup):
         max=MAXIMUM_LAYERS,
         update=_changed,
     )
+    variant: EnumProperty(
+        name="Variant",
+        description="How the layers behind the nearest surfaces are found: what is exact, and what is faster",
+        items=VARIANT_ITEMS,
+        default=Variant.TWO_PASS.value,
+        update=_changed,
+    )
+    separation_unit: EnumProperty(
+        name="Separation",
+        description="What the minimum separation of layers is measured in",
+        items=SEPARATION_ITEMS,
+        default=SeparationUnit.DISTANCE.value,
+        update=_changed,
+    )
     minimum_separation: FloatProperty(
         name="Minimum Separation",
         description="Least distance along the view between a layer and the next: closer surfaces are skipped, so that "
@@ -84,6 +159,51 @@ class DeepGBufferSettings(bpy.types.PropertyGroup):
         soft_max=10.0,
         precision=3,
         subtype="DISTANCE",
+        update=_changed,
+    )
+    relative_separation: FloatProperty(
+        name="Minimum Separation",
+        description="Least distance along the view between a layer and the next, as a fraction of the layer's own "
+        "distance: closer surfaces are skipped, near the camera finer ones than far away",
+        default=0.05,
+        min=0.0,
+        soft_max=1.0,
+        precision=3,
+        subtype="FACTOR",
+        update=_changed,
+    )
+    use_guard_band: BoolProperty(
+        name="Guard Band",
+        description="Render past the picture's edge internally, so that effects which look up neighboring pixels or "
+        "the previous frame find data there; the picture itself keeps its size",
+        default=False,
+        update=_changed,
+    )
+    guard_band_unit: EnumProperty(
+        name="Unit",
+        description="What the width of the guard band is measured in",
+        items=GUARD_BAND_ITEMS,
+        default=GuardBandUnit.PIXELS.value,
+        update=_changed,
+    )
+    guard_band_pixels: IntProperty(
+        name="Width",
+        description="Pixels that are rendered past each edge of the picture",
+        default=64,
+        min=0,
+        soft_max=256,
+        max=4096,
+        subtype="PIXEL",
+        update=_changed,
+    )
+    guard_band_percent: FloatProperty(
+        name="Width",
+        description="Percentage of the picture's longer side that is rendered past each edge",
+        default=3.0,
+        min=0.0,
+        soft_max=10.0,
+        max=50.0,
+        subtype="PERCENTAGE",
         update=_changed,
     )
     debug_view: EnumProperty(
@@ -104,6 +224,17 @@ class DeepGBufferSettings(bpy.types.PropertyGroup):
     save_layers: BoolProperty(
         name="Multi-Layer EXR",
         description="Write every channel of every layer to a multi-layer OpenEXR file after a final render",
+        default=False,
+    )
+    save_motion: BoolProperty(
+        name="Motion Vectors",
+        description="Add how many pixels each layer's surfaces moved since the previous frame",
+        default=False,
+    )
+    save_exit: BoolProperty(
+        name="Exit Surfaces",
+        description="Add depth, normal and base color of where the view leaves the objects of each layer again; in a "
+        "deep EXR, this depth ends each sample (ZBack)",
         default=False,
     )
     save_deep: BoolProperty(

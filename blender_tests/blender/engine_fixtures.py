@@ -11,6 +11,11 @@ import OpenEXR
 import pytest
 
 import addon
+from addon.engine import final
+from addon.engine.viewport_session import ViewportSession
+from addon.render import gl_thread
+from addon.scene import Camera
+from blender_tests import builders
 
 PLANE_DISTANCE = 5.0
 OBJECT_INDEX = 7
@@ -47,6 +52,82 @@ def plane_scene_fixture(registered: None, tmp_path: Path) -> bpy.types.Scene:
     sun.energy = math.pi
     add_object("Sun", sun, (0.0, 0.0, 9.0))
     return scene
+
+
+@pytest.fixture(name="session")
+def session_fixture() -> Iterator[ViewportSession]:
+    """A viewport's session without a viewport."""
+    session = ViewportSession()
+    yield session
+    session.close()
+    gl_thread().submit(lambda _device: None).result(timeout=60)
+
+
+def idle(session: ViewportSession) -> None:
+    """Wait until the session has nothing queued: each job queues its successor before the next of ours runs."""
+    while session.busy:
+        gl_thread().submit(lambda _device: None).result(timeout=60)
+
+
+def camera_at(x: float) -> Camera:
+    """A camera at x, 5 m above the origin's plane, that looks down."""
+    return Camera(builders.translation(x=x, z=PLANE_DISTANCE), (-0.5, 0.5, -0.4, 0.4), 0.1, 100.0)
+
+
+class Intercepted:
+    """An engine some of whose methods are a test's own; Blender's types cannot be patched themselves."""
+
+    def __init__(self, engine, methods):
+        self._engine, self._methods = engine, methods
+
+    def __getattr__(self, name):
+        if name in self._methods:
+            return self._methods[name]
+        return getattr(self._engine, name)
+
+
+@pytest.fixture(name="intercept")
+def intercept_fixture(monkeypatch):
+    """intercept(method=function, ...): final renders call these instead of Blender's."""
+
+    def intercept(**methods):
+        original = final.FinalRender.__init__
+
+        def init(self, engine, session):
+            original(self, Intercepted(engine, methods), session)
+
+        monkeypatch.setattr(final.FinalRender, "__init__", init)
+
+    return intercept
+
+
+@pytest.fixture(name="moving_scene")
+def moving_scene_fixture(plane_scene: bpy.types.Scene) -> bpy.types.Scene:
+    """The plane below a camera that moves right by 1/8 m a frame, with a box in between that moves left by 1/4 m and a
+    sail that a shape key lifts by 1/8 m; x and height are 0 at frame 0. 64 x 36 pixels, a file of two layers."""
+    plane_scene.render.resolution_x, plane_scene.render.resolution_y = 64, 36
+    ours = plane_scene.deep_gbuffer
+    ours.save_layers, ours.save_motion, ours.save_exit = True, True, True
+    bpy.ops.mesh.primitive_cube_add(size=1.0, location=(0.0, 0.0, 2.0))
+    box = bpy.context.object
+    box.name = "Box"
+    sail = add_plane("Sail", -1.5, -0.5, 1.0)
+    sail.shape_key_add(name="Basis")
+    lifted = sail.shape_key_add(name="Lifted")
+    for point in lifted.data:
+        point.co.z += 1.0
+    for owner, path, index, step in (
+        (plane_scene.camera, "location", 0, 0.125),
+        (box, "location", 0, -0.25),
+        (lifted, "value", -1, 0.125),
+    ):
+        animate(owner, path, index, step)
+    return plane_scene
+
+
+def animate(owner: bpy.types.bpy_struct, path: str, index: int, step: float) -> None:
+    """Make a property grow by exactly `step` per frame, from 0 at frame 0; `index` of a vector, −1 for a number."""
+    owner.driver_add(path, index).driver.expression = f"frame * {step}"
 
 
 def add_object(name: str, data: bpy.types.ID | None, location: tuple[float, float, float]) -> bpy.types.Object:

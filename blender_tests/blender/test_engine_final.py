@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.engine import final, sessions, statistics
+from addon.engine import sessions, statistics
 from addon.render import Renderer, device
 from blender_tests.blender.engine_fixtures import (  # noqa: F401 - fixtures
     BASE_COLOR,
@@ -15,6 +15,7 @@ from blender_tests.blender.engine_fixtures import (  # noqa: F401 - fixtures
     PLANE_DISTANCE,
     add_object,
     add_plane,
+    intercept_fixture,
     plane_scene_fixture,
     read_multilayer,
     read_result,
@@ -177,33 +178,6 @@ def test_a_debug_view_replaces_the_picture(plane_scene, tmp_path):
     shown = render(plane_scene, tmp_path)["ViewLayer.Combined"]
     np.testing.assert_allclose(shown[INSIDE][:3], BASE_COLOR, atol=5e-3)
     assert not np.array_equal(shown, beauty)
-
-
-class Intercepted:
-    """An engine some of whose methods are a test's own; Blender's types cannot be patched themselves."""
-
-    def __init__(self, engine, methods):
-        self._engine, self._methods = engine, methods
-
-    def __getattr__(self, name):
-        if name in self._methods:
-            return self._methods[name]
-        return getattr(self._engine, name)
-
-
-@pytest.fixture(name="intercept")
-def intercept_fixture(monkeypatch):
-    """intercept(method=function, ...): final renders call these instead of Blender's."""
-
-    def intercept(**methods):
-        original = final.FinalRender.__init__
-
-        def init(self, engine, session):
-            original(self, Intercepted(engine, methods), session)
-
-        monkeypatch.setattr(final.FinalRender, "__init__", init)
-
-    return intercept
 
 
 @pytest.fixture(name="rendered_samples")

@@ -6,21 +6,38 @@ from types import SimpleNamespace
 import bpy
 import pytest
 
-from addon.ui.panels import CLASSES, DEEP_GBUFFER_PT_statistics
+from addon.ui.panels import (
+    CLASSES,
+    DEEP_GBUFFER_PT_guard_band,
+    DEEP_GBUFFER_PT_layer_output,
+    DEEP_GBUFFER_PT_layers,
+    DEEP_GBUFFER_PT_statistics,
+)
 from blender_tests.blender.engine_fixtures import plane_scene_fixture, registered_fixture  # noqa: F401 - fixtures
+
+PANELS = [panel for panel in CLASSES if hasattr(panel, "_column")]
+ALTERNATIVES = {"minimum_separation": "relative_separation", "guard_band_pixels": "guard_band_percent"}
+"""Properties of which a panel shows one or the other."""
 
 
 class Layout:
-    """Stands in for a UILayout: checks properties and collects texts."""
+    """Stands in for a UILayout: checks properties, and collects texts, properties and those that are grayed out."""
 
-    def __init__(self):
-        self.texts = []
-        self.properties = []
+    def __init__(self, parent=None):
+        self.active = True
+        self.parent = parent
+        self.texts = parent.texts if parent else []
+        self.properties = parent.properties if parent else []
+        self.gray = parent.gray if parent else set()
 
     def _nested(self, **_options):
-        return self
+        return Layout(self)
 
     box = column = row = split = _nested
+
+    @property
+    def grayed_out(self):
+        return not self.active or (self.parent is not None and self.parent.grayed_out)
 
     def label(self, text):
         self.texts.append(text)
@@ -28,6 +45,8 @@ class Layout:
     def prop(self, data, name, **_options):
         assert name in data.bl_rna.properties, name
         self.properties.append(name)
+        if self.grayed_out:
+            self.gray.add(name)
 
     def operator(self, name, **_options):
         category, function = name.split(".")
@@ -35,14 +54,17 @@ class Layout:
 
 
 def drawn(panel):
-    layout = Layout()
-    stand_in = SimpleNamespace(layout=layout)
-    stand_in._column = lambda: panel._column(stand_in)
-    panel.draw(stand_in, bpy.context)
-    return layout
+    """What the panel and its header show."""
+    whole = Layout()
+    for draw in (getattr(panel, "draw_header", None), panel.draw):
+        if draw is not None:
+            stand_in = SimpleNamespace(layout=Layout(whole))
+            stand_in._column = lambda panel=panel, stand_in=stand_in: panel._column(stand_in)
+            draw(stand_in, bpy.context)
+    return whole
 
 
-@pytest.mark.parametrize("panel", [panel for panel in CLASSES if hasattr(panel, "_column")])
+@pytest.mark.parametrize("panel", PANELS)
 def test_every_panel_draws_before_and_after_a_render(plane_scene, panel):
     before = drawn(panel)
     bpy.ops.render.render()
@@ -52,10 +74,45 @@ def test_every_panel_draws_before_and_after_a_render(plane_scene, panel):
 
 
 def test_every_setting_has_its_place_in_a_panel(plane_scene):
-    shown = {name for panel in CLASSES if hasattr(panel, "_column") for name in drawn(panel).properties}
-    own = {item.identifier for item in plane_scene.deep_gbuffer.bl_rna.properties} - {"rna_type", "name"}
-    assert own <= shown
+    ours = plane_scene.deep_gbuffer
+    shown = {name for panel in PANELS for name in drawn(panel).properties}
+    assert not shown & set(ALTERNATIVES.values())
+    ours.separation_unit, ours.guard_band_unit = "RELATIVE", "PERCENT"
+    others = {name for panel in PANELS for name in drawn(panel).properties}
+    assert not others & set(ALTERNATIVES)
+    own = {item.identifier for item in ours.bl_rna.properties} - {"rna_type", "name"}
+    assert own <= shown | others
     assert {"film_transparent", "filter_size", "use_pass_z", "use_pass_object_index"} <= shown
+
+
+def test_what_only_concerns_several_layers_is_gray_with_one(plane_scene):
+    assert not drawn(DEEP_GBUFFER_PT_layers).gray
+    plane_scene.deep_gbuffer.layers = 1
+    assert drawn(DEEP_GBUFFER_PT_layers).gray == {"variant", "separation_unit", "minimum_separation"}
+
+
+@pytest.mark.parametrize(
+    ("variant", "layers", "used", "gray"),
+    [
+        ("REPROJECT", 2, True, set()),
+        ("REPROJECT", 2, False, {"guard_band_unit", "guard_band_pixels"}),
+        ("REPROJECT", 1, True, {"use_guard_band", "guard_band_unit", "guard_band_pixels"}),
+        ("PREVIOUS", 2, True, {"use_guard_band", "guard_band_unit", "guard_band_pixels"}),
+    ],
+)
+def test_a_guard_band_that_nothing_reads_is_gray(plane_scene, variant, layers, used, gray):
+    ours = plane_scene.deep_gbuffer
+    ours.variant, ours.layers, ours.use_guard_band = variant, layers, used
+    assert drawn(DEEP_GBUFFER_PT_guard_band).gray == gray
+
+
+def test_options_of_files_that_are_not_written_are_gray(plane_scene):
+    ours = plane_scene.deep_gbuffer
+    assert drawn(DEEP_GBUFFER_PT_layer_output).gray == {"save_motion", "save_exit", "layers_path"}
+    ours.save_deep = True
+    assert drawn(DEEP_GBUFFER_PT_layer_output).gray == {"save_motion"}
+    ours.save_deep, ours.save_layers = False, True
+    assert not drawn(DEEP_GBUFFER_PT_layer_output).gray
 
 
 def test_statistics_show_times_passes_reasons_and_memory(plane_scene):

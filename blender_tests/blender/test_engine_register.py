@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Registering, and taking everything back without a trace."""
 
+import re
 import subprocess
 import sys
 import threading
@@ -12,8 +13,10 @@ import pytest
 import addon
 from addon.engine import sessions, viewport
 from addon.engine.statistics import ENGINE
+from addon.scene import DebugView, Variant
 from blender_tests.blender.engine_fixtures import plane_scene_fixture, registered_fixture  # noqa: F401 - fixtures
 
+PRESETS = ("deep_gbuffer/sampling", "deep_gbuffer/layers")
 IN_ALL_VERSIONS = (
     "RENDER_PT_format",
     "RENDER_PT_output",
@@ -44,7 +47,7 @@ def traces():
         "handlers": {name: list(getattr(bpy.app.handlers, name)) for name in names},
         "timers": bpy.app.timers.is_registered(viewport._tick),
         "properties": sorted(bpy.types.Scene.bl_rna.properties.keys()),
-        "presets": sorted(bpy.utils.preset_paths("deep_gbuffer/sampling")),
+        "presets": sorted(path for folder in PRESETS for path in bpy.utils.preset_paths(folder)),
         "threads": sorted(thread.name for thread in threading.enumerate() if thread.name == "GLThread"),
         "sessions": (len(sessions._final), len(sessions._mirrors), len(viewport._viewports)),
     }
@@ -100,28 +103,59 @@ def test_a_process_that_forgets_to_unregister_ends(registered):
 def test_every_property_tells_what_it_is(registered):
     settings = bpy.context.scene.deep_gbuffer
     own = [item for item in settings.bl_rna.properties if item.identifier not in {"rna_type", "name"}]
-    assert len(own) == 12
+    assert len(own) == 21
     for item in own:
         assert len(item.description) > 15, item.identifier
         assert not item.description.endswith("."), item.identifier
         if item.type in {"INT", "FLOAT"}:
             assert item.soft_max <= item.hard_max
             assert item.hard_min <= item.default <= item.soft_max
-    units = {item.identifier: item.unit for item in own if item.type == "FLOAT"}
+        for choice in item.enum_items if item.type == "ENUM" else ():
+            assert len(choice.description) > 15 or choice.identifier == "NONE", (item.identifier, choice.identifier)
+            assert not choice.description.endswith("."), (item.identifier, choice.identifier)
+    units = {item.identifier: item.unit for item in own if item.type == "FLOAT" and item.unit != "NONE"}
     assert units == {"minimum_separation": "LENGTH", "time_limit": "TIME_ABSOLUTE"}
+
+
+def test_every_variant_and_every_debug_view_can_be_chosen(registered):
+    properties = bpy.context.scene.deep_gbuffer.bl_rna.properties
+    assert [item.identifier for item in properties["variant"].enum_items] == list(Variant)
+    assert [item.identifier for item in properties["debug_view"].enum_items] == list(DebugView)
 
 
 def test_defaults(registered, plane_scene):
     fresh = bpy.data.scenes.new("Fresh").deep_gbuffer
     assert (fresh.samples, fresh.viewport_samples, fresh.layers, fresh.minimum_separation) == (16, 16, 2, 0.5)
     assert (fresh.time_limit, fresh.layers_path, fresh.save_layers, fresh.save_deep) == (0.0, "//", False, False)
+    assert (fresh.separation_unit, fresh.relative_separation) == ("DISTANCE", pytest.approx(0.05))
+    assert (fresh.use_guard_band, fresh.guard_band_unit, fresh.guard_band_pixels) == (False, "PIXELS", 64)
+    assert fresh.guard_band_percent == 3.0
+    assert (fresh.save_motion, fresh.save_exit) == (False, False)
 
 
-def test_presets_set_samples(registered, plane_scene):
-    found = [path for path in bpy.utils.preset_paths("deep_gbuffer/sampling") if "addon" in path]
+@pytest.mark.parametrize(
+    ("folder", "preset", "name", "value"),
+    [
+        ("deep_gbuffer/sampling", "Draft", "samples", 4),
+        ("deep_gbuffer/layers", "Tabletop", "minimum_separation", pytest.approx(0.02)),
+        ("deep_gbuffer/layers", "Landscape", "separation_unit", "RELATIVE"),
+    ],
+)
+def test_presets_set_what_they_are_for(registered, plane_scene, folder, preset, name, value):
+    found = [path for path in bpy.utils.preset_paths(folder) if "addon" in path]
     assert len(found) == 1
-    bpy.ops.script.execute_preset(filepath=f"{found[0]}/Draft.py", menu_idname="DEEP_GBUFFER_PT_sampling_presets")
-    assert bpy.context.scene.deep_gbuffer.samples == 4
+    menu = f"DEEP_GBUFFER_PT_{folder.split('/')[1]}_presets"
+    bpy.ops.script.execute_preset(filepath=f"{found[0]}/{preset}.py", menu_idname=menu)
+    assert getattr(bpy.context.scene.deep_gbuffer, name) == value
+
+
+def test_every_shipped_preset_sets_existing_properties(registered):
+    settings = bpy.context.scene.deep_gbuffer
+    for folder in PRESETS:
+        for path in next(Path(path) for path in bpy.utils.preset_paths(folder) if "addon" in path).glob("*.py"):
+            names = re.findall(r"^settings\.(\w+) =", path.read_text(encoding="utf-8"), re.MULTILINE)
+            assert names, path
+            assert all(name in settings.bl_rna.properties for name in names), path
 
 
 def test_copying_statistics_needs_a_render(plane_scene):

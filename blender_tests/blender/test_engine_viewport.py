@@ -18,8 +18,11 @@ from addon.scene import Camera, DebugView, RenderSettings
 from blender_tests import builders
 from blender_tests.blender.engine_fixtures import (  # noqa: F401 - fixtures
     BASE_COLOR,
+    camera_at,
+    idle,
     plane_scene_fixture,
     registered_fixture,
+    session_fixture,
 )
 
 WIDTH, HEIGHT = 48, 32
@@ -27,28 +30,8 @@ SCENE = builders.scene(builders.quad("q"), lights=(builders.light(),))
 SETTINGS = RenderSettings(24, 16, samples=4)
 
 
-def camera(x=0.0):
-    pose = np.eye(4)
-    pose[:3, 3] = (x, 0.0, 5.0)
-    return Camera(pose, (-0.5, 0.5, -0.4, 0.4), 0.1, 100.0)
-
-
-def idle(session):
-    """Wait until the session has nothing queued: each job queues its successor before the next of ours runs."""
-    while session.busy:
-        gl_thread().submit(lambda _device: None).result(timeout=60)
-
-
-@pytest.fixture(name="session")
-def session_fixture():
-    session = ViewportSession()
-    yield session
-    session.close()
-    gl_thread().submit(lambda _device: None).result(timeout=60)
-
-
 def test_a_session_refines_until_the_samples_are_there(session):
-    session.show(SCENE, camera(), SETTINGS)
+    session.show(SCENE, camera_at(0.0), SETTINGS)
     idle(session)
     assert session.error is None
     assert session.picture.samples == 4
@@ -57,10 +40,10 @@ def test_a_session_refines_until_the_samples_are_there(session):
 
 
 def test_showing_the_same_view_again_does_not_start_over(session):
-    session.show(SCENE, camera(), SETTINGS)
+    session.show(SCENE, camera_at(0.0), SETTINGS)
     idle(session)
     picture, revision = session.picture, session.revision
-    session.show(SCENE, camera(), SETTINGS)
+    session.show(SCENE, camera_at(0.0), SETTINGS)
     assert not session.busy
     assert (session.picture, session.revision) == (picture, revision)
 
@@ -68,14 +51,14 @@ def test_showing_the_same_view_again_does_not_start_over(session):
 @pytest.mark.parametrize(
     "changed",
     [
-        (SCENE, camera(0.5), SETTINGS),
-        (SCENE, camera(), RenderSettings(20, 10, samples=4)),
-        (SCENE, camera(), RenderSettings(24, 16, samples=4, debug_view=DebugView.NORMAL)),
-        (builders.scene(builders.quad("q")), camera(), SETTINGS),
+        (SCENE, camera_at(0.5), SETTINGS),
+        (SCENE, camera_at(0.0), RenderSettings(20, 10, samples=4)),
+        (SCENE, camera_at(0.0), RenderSettings(24, 16, samples=4, debug_view=DebugView.NORMAL)),
+        (builders.scene(builders.quad("q")), camera_at(0.0), SETTINGS),
     ],
 )
 def test_anything_that_changes_the_picture_starts_over_and_keeps_the_old_one_until_then(session, changed):
-    session.show(SCENE, camera(), SETTINGS)
+    session.show(SCENE, camera_at(0.0), SETTINGS)
     idle(session)
     before = session.picture
     gate = threading.Event()
@@ -92,7 +75,7 @@ def test_many_camera_moves_queue_one_job_and_show_the_last(session):
     gate = threading.Event()
     gl_thread().submit(lambda _device: gate.wait(60))
     for step in range(50):
-        session.show(SCENE, camera(step / 50), SETTINGS)
+        session.show(SCENE, camera_at(step / 50), SETTINGS)
     assert gl_thread()._jobs.qsize() <= 2
     gate.set()
     idle(session)
@@ -104,7 +87,7 @@ def test_a_closed_session_stops_and_frees_its_renderer(monkeypatch):
     original = Renderer.release
     monkeypatch.setattr(Renderer, "release", lambda self: (released.append(self), original(self)))
     session = ViewportSession()
-    session.show(SCENE, camera(), RenderSettings(24, 16, samples=100_000))
+    session.show(SCENE, camera_at(0.0), RenderSettings(24, 16, samples=100_000))
     session.close()
     gl_thread().submit(lambda _device: None).result(timeout=60)
     gl_thread().submit(lambda _device: None).result(timeout=60)
@@ -115,18 +98,18 @@ def test_a_closed_session_stops_and_frees_its_renderer(monkeypatch):
 def test_a_closed_session_takes_no_more_views():
     session = ViewportSession()
     session.close()
-    session.show(SCENE, camera(), SETTINGS)
+    session.show(SCENE, camera_at(0.0), SETTINGS)
     assert not session.busy
 
 
 def test_an_error_is_kept_and_the_next_view_tries_again(session, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(Renderer, "begin", lambda *_: (_ for _ in ()).throw(ValueError("broken")))
-        session.show(SCENE, camera(), SETTINGS)
+        session.show(SCENE, camera_at(0.0), SETTINGS)
         idle(session)
         assert "broken" in session.error
         assert session.picture is None
-    session.show(SCENE, camera(1.0), SETTINGS)
+    session.show(SCENE, camera_at(1.0), SETTINGS)
     idle(session)
     assert session.error is None
     assert session.picture.complete
@@ -140,7 +123,7 @@ def test_no_opengl_is_an_error_and_does_not_loop(monkeypatch):
 
     monkeypatch.setattr("addon.render.device._create_context", broken)
     session = ViewportSession()
-    session.show(SCENE, camera(), SETTINGS)
+    session.show(SCENE, camera_at(0.0), SETTINGS)
     with pytest.raises(DeviceError):
         gl_thread().submit(lambda _device: None).result(timeout=60)
     stop_gl_thread()
@@ -331,7 +314,7 @@ def test_an_error_is_painted_as_text(with_gpu, monkeypatch):
 def test_stopping_the_gl_thread_while_a_view_refines_ends_and_the_view_can_be_shown_again(session):
     """A future that is done already calls back at once, inside the lock: this would hang with a plain one."""
     endless = RenderSettings(24, 16, samples=1_000_000)
-    session.show(SCENE, camera(), endless)
+    session.show(SCENE, camera_at(0.0), endless)
     while session.picture is None:
         gl_thread().submit(lambda _device: None).result(timeout=60)
     stopper = threading.Thread(target=stop_gl_thread, daemon=True)
@@ -340,7 +323,7 @@ def test_stopping_the_gl_thread_while_a_view_refines_ends_and_the_view_can_be_sh
     assert not stopper.is_alive()
     assert not session.busy
     before = session.revision
-    session.show(SCENE, camera(), endless)
+    session.show(SCENE, camera_at(0.0), endless)
     while session.revision == before:
         gl_thread().submit(lambda _device: None).result(timeout=60)
     assert session.error is None

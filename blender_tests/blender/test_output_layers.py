@@ -5,7 +5,6 @@ import json
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -17,27 +16,32 @@ from hypothesis.extra import numpy as hnp
 
 from addon import output
 from addon.engine.layer_output import file_name
+from addon.render import LayerImages
 from blender_tests.blender.engine_fixtures import (  # noqa: F401 - fixtures
     add_plane,
+    moving_scene_fixture,
     plane_scene_fixture,
     registered_fixture,
     render,
 )
 
 FINITE = st.floats(-1e6, 1e6, width=32)
+DEPTHS = st.one_of(st.just(np.inf), st.floats(0.125, 1e6, width=32))
+PLAIN_CHANNELS, MOTION_CHANNELS, EXIT_CHANNELS = 16, 3, 7
 
 
 @st.composite
 def layer_stacks(draw):
-    """1–3 layers of one small size, with empty pixels."""
+    """1–3 layers of one small size, with empty pixels; all with motion or none, all with exit surfaces or none."""
     height, width = draw(st.integers(1, 4)), draw(st.integers(1, 5))
+    motion, exits = draw(st.booleans()), draw(st.booleans())
 
     def image(*channels, elements=FINITE):
         return draw(hnp.arrays(np.float32, (height, width, *channels), elements=elements))
 
     return [
-        SimpleNamespace(
-            depth=image(elements=st.one_of(st.just(np.inf), st.floats(0.125, 1e6, width=32))),
+        LayerImages(
+            depth=image(elements=DEPTHS),
             radiance=image(3),
             normal=image(3),
             albedo=image(3),
@@ -45,6 +49,10 @@ def layer_stacks(draw):
             roughness=image(),
             emission=image(3),
             object_index=image(),
+            motion=image(2) if motion else None,
+            exit_depth=image(elements=DEPTHS) if exits else None,
+            exit_normal=image(3) if exits else None,
+            exit_albedo=image(3) if exits else None,
         )
         for _ in range(draw(st.integers(1, 3)))
     ]
@@ -55,19 +63,32 @@ def planes(path: Path):
         return {name: np.array(channel.pixels) for name, channel in file.channels().items()}
 
 
+def written_depth(depth):
+    """View depth as a file holds it: row 0 at the top, 1e10 where there is nothing."""
+    return np.where(np.isfinite(depth), depth, np.float32(1e10))[::-1]
+
+
 @settings(max_examples=25, deadline=None)
 @given(layer_stacks())
 def test_every_channel_of_every_layer_comes_back(tmp_path_factory, layers):
     path = tmp_path_factory.mktemp("layers") / "new folder" / "x.exr"
     output.write_layers(path, layers)
     read = planes(path)
-    assert len(read) == 16 * len(layers)
+    moves, exits = layers[0].motion is not None, layers[0].exit_depth is not None
+    assert len(read) == (PLAIN_CHANNELS + moves * MOTION_CHANNELS + exits * EXIT_CHANNELS) * len(layers)
     for index, layer in enumerate(layers):
-        depth = np.where(np.isfinite(layer.depth), layer.depth, np.float32(1e10))
-        np.testing.assert_array_equal(read[f"layer{index}.Depth.Z"], depth[::-1])
+        np.testing.assert_array_equal(read[f"layer{index}.Depth.Z"], written_depth(layer.depth))
         np.testing.assert_array_equal(read[f"layer{index}.Radiance.G"], layer.radiance[::-1, :, 1])
         np.testing.assert_array_equal(read[f"layer{index}.Normal.Z"], layer.normal[::-1, :, 2])
         np.testing.assert_array_equal(read[f"layer{index}.Roughness.V"], layer.roughness[::-1])
+        if moves:
+            np.testing.assert_array_equal(read[f"layer{index}.Motion.X"], layer.motion[::-1, :, 0])
+            np.testing.assert_array_equal(read[f"layer{index}.Motion.Y"], layer.motion[::-1, :, 1])
+            assert not read[f"layer{index}.Motion.Z"].any()
+        if exits:
+            np.testing.assert_array_equal(read[f"layer{index}.ExitDepth.Z"], written_depth(layer.exit_depth))
+            np.testing.assert_array_equal(read[f"layer{index}.ExitNormal.Y"], layer.exit_normal[::-1, :, 1])
+            np.testing.assert_array_equal(read[f"layer{index}.ExitAlbedo.B"], layer.exit_albedo[::-1, :, 2])
     assert [item.name for item in path.parent.iterdir()] == ["x.exr"]
 
 
@@ -79,7 +100,8 @@ def test_a_deep_pixel_has_one_sample_per_layer_that_is_there(tmp_path_factory, l
     with OpenEXR.File(str(path), separate_channels=True) as file:
         assert file.header()["type"] == OpenEXR.deepscanline
         read = {name: channel.pixels for name, channel in file.channels().items()}
-    assert set(read) == set("ZRGBA")
+    exits = layers[0].exit_depth is not None
+    assert set(read) == {*"ZRGBA", *(["ZBack"] if exits else [])}
     height, width = layers[0].depth.shape
     for row in range(height):
         for column in range(width):
@@ -90,6 +112,9 @@ def test_a_deep_pixel_has_one_sample_per_layer_that_is_there(tmp_path_factory, l
                 "B": [layer.radiance[row, column, 2] for layer in there],
                 "A": [1.0] * len(there),
             }
+            if exits:
+                backs = [(layer.exit_depth[row, column], layer.depth[row, column]) for layer in there]
+                expected["ZBack"] = [back if np.isfinite(back) else front for back, front in backs]
             for name, values in expected.items():
                 samples = read[name][height - 1 - row, column]
                 np.testing.assert_array_equal([] if samples is None else samples, np.array(values, np.float32))
@@ -97,7 +122,7 @@ def test_a_deep_pixel_has_one_sample_per_layer_that_is_there(tmp_path_factory, l
 
 @pytest.mark.parametrize("write", [output.write_layers, output.write_deep])
 def test_a_file_that_cannot_be_written_leaves_the_old_one_and_no_scrap(tmp_path, write, monkeypatch):
-    layer = SimpleNamespace(
+    layer = LayerImages(
         **{name: np.ones((2, 2), np.float32) for name in ("depth", "metallic", "roughness", "object_index")},
         **{name: np.ones((2, 2, 3), np.float32) for name in ("radiance", "normal", "albedo", "emission")},
     )
@@ -148,16 +173,25 @@ def test_a_render_saves_both_files(plane_scene, tmp_path):
     np.testing.assert_allclose(depths[row, right], (7.0,), rtol=1e-5)
 
 
-def test_a_scene_snapshot_renders_the_same_picture_without_blender(plane_scene, tmp_path):
+@pytest.mark.parametrize("variant", ["TWO_PASS", "REPROJECT", "PREDICT"])
+def test_a_scene_snapshot_renders_the_same_picture_without_blender(moving_scene, tmp_path, variant):
     """The job that build.py runs for a .npz, in a process that cannot import bpy; same bits as Blender's result."""
-    plane_scene.deep_gbuffer.save_snapshot = True
-    plane_scene.deep_gbuffer.layers_path = f"{tmp_path}/shot_"
-    expected = render(plane_scene, tmp_path)["ViewLayer.Combined"]
+    ours = moving_scene.deep_gbuffer
+    ours.save_layers, ours.save_snapshot, ours.layers_path = False, True, f"{tmp_path}/shot_"
+    ours.variant, ours.debug_view, ours.debug_layer = variant, "DIRECT", 2
+    moving_scene.frame_set(4)
+    expected = render(moving_scene, tmp_path)["ViewLayer.Combined"]
+    assert expected[..., 0].max() > 0.1
     job = {
-        "file": str(tmp_path / "shot_0001_snapshot.npz"),
-        "resolution": [plane_scene.render.resolution_x, plane_scene.render.resolution_y],
-        "samples": plane_scene.deep_gbuffer.samples,
-        "set": [["layers", "3"], ["filter_radius", str(plane_scene.render.filter_size)]],
+        "file": str(tmp_path / "shot_0004_snapshot.npz"),
+        "resolution": [moving_scene.render.resolution_x, moving_scene.render.resolution_y],
+        "samples": ours.samples,
+        "set": [
+            ["variant", variant],
+            ["debug_view", "DIRECT"],
+            ["debug_layer", "1"],
+            ["filter_radius", str(moving_scene.render.filter_size)],
+        ],
         "time_limit": None,
         "repeat": 1,
         "scratch": str(tmp_path),

@@ -23,6 +23,7 @@ PACKAGE = "bl_ext.user_default.deep_gbuffer"
 STEP_SECONDS = 0.02
 PATIENCE_SECONDS = 60
 SAMPLES = 8
+VARIANTS = ("TWO_PASS", "DELAY", "PREVIOUS", "REPROJECT")
 FILLS_THE_REGION = (2.0 - math.sqrt(2.0)) * 50.0
 """The camera view's zoom at which the camera's frame is as large as the region."""
 
@@ -153,6 +154,7 @@ def scenario() -> Iterator[None]:
     screenshot("first")
     yield from camera_view(area)
     yield from edits(area)
+    yield from variants()
     yield from border(area)
     yield from undo_while_rendering()
     yield from cancel()
@@ -186,6 +188,21 @@ def edits(area) -> Iterator[None]:
     screenshot("debug")
     yield from f12("debug")
     settings.debug_view = "NONE"
+
+
+def variants() -> Iterator[None]:
+    """The second layer after the camera went away and came back, found in several ways."""
+    settings, camera = bpy.context.scene.deep_gbuffer, bpy.data.objects["Camera"]
+    settings.debug_view, settings.debug_layer = "DIRECT", 2
+    place = camera.location.copy()
+    for variant in VARIANTS:
+        settings.variant = variant
+        for distance in (0.1, 0.2, 0.1, 0.0):
+            camera.location.x = place.x + distance
+            yield from frames(3)
+        yield from settle()
+        screenshot(variant)
+    settings.variant, settings.debug_view, settings.debug_layer = VARIANTS[0], "NONE", 1
 
 
 def border(area) -> Iterator[None]:

@@ -55,6 +55,14 @@ def test_a_moved_object_shows(window):
     assert differing(window.viewport("edited"), window.viewport("moved")) > 0.02
 
 
+@pytest.mark.parametrize("variant", ["DELAY", "PREVIOUS", "REPROJECT"])
+def test_a_viewport_comes_to_rest_in_the_same_picture_with_every_variant(window, variant):
+    expected = window.viewport("TWO_PASS")
+    assert expected.std() > 0.03
+    assert differing(expected, window.viewport("edited")) > 0.1
+    np.testing.assert_array_equal(window.viewport(variant), expected)
+
+
 def test_a_border_shows_only_its_part(window):
     whole, part = window.viewport("edited"), window.viewport("border")
     height, width = whole.shape[:2]

@@ -69,7 +69,7 @@ bool too_near_previous_layer()
     // must do.
     if (surface.previous.w >= clip_start)
     {
-        vec2 origin = gl_FragCoord.xy - motion_vector() + oracle_offset;
+        vec2 origin = gl_FragCoord.xy - motion_vector();
         origin = clamp(origin, vec2(0.0), resolution - 0.5);
         pixel = ivec2(origin);
         offset = abs(origin - (vec2(pixel) + 0.5));

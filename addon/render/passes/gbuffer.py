@@ -7,7 +7,7 @@ from ...scene import Moment, Variant
 from ...scene.drift import pixel_drift
 from ...scene.history import same_population
 from ..device import Device
-from ..plan import ORACLE_TARGET, PlannedPass
+from ..plan import HISTORY_TARGET, ORACLE_TARGET, PlannedPass
 from ..programs import ProgramSpec
 from ..sampling import film_sample
 from .base import Frame
@@ -64,8 +64,8 @@ class GBufferPass:
     def _draw_at_once(self, frame: Frame) -> None:
         plan, state = frame.plan, frame.oracle
         channels = tuple(channel for channel, _ in plan.channels)
-        assert state.moment is not None
-        exact = state.shows(frame.moment)
+        shown = state.shown.moment
+        exact = state.shows(state.source, frame.moment)
         reprojects = plan.variant is Variant.REPROJECT and not exact
         defines = {"ORACLE", *(("REPROJECT",) if reprojects else ()), *(("LOOK_AHEAD",) if plan.look_ahead else ())}
         ahead = _look_ahead(frame) if plan.look_ahead else None
@@ -73,9 +73,8 @@ class GBufferPass:
             frame.moment,
             GeometryProgram(channels, frozenset(defines), plan.drawn_layers, frame.layering),
             targets=tuple(channel.target_name for channel in channels),
-            oracle=frame.pool.texture(ORACLE_TARGET),
-            oracle_offset=_jitter_between(frame, state.moment) if reprojects else (0.0, 0.0),
-            oracle_drift=0.0 if exact or reprojects else pixel_drift(state.moment, frame.moment, *frame.pool.size),
+            oracle=frame.pool.texture(state.source),
+            oracle_drift=0.0 if exact or reprojects else pixel_drift(shown, frame.moment, *frame.pool.size),
             previous=_previous(frame),
             following=ahead,
         )
@@ -83,18 +82,21 @@ class GBufferPass:
         self._leave(frame, ahead)
 
     def _leave(self, frame: Frame, ahead: Moment | None) -> None:
-        """Keep what the next picture's layers may be tested against."""
+        """Keep what the next picture's layers may be tested against: the next sample's, or the next view's.
+
+        Of a view its first sample is kept, which goes through pixel centres as the next view's first does.
+        """
         plan, state = frame.plan, frame.oracle
-        if ahead is not None and same_population(frame.scene, ahead.scene):
-            frame.pool.copy("gbuffer.view_depth", plan.layers, ORACLE_TARGET, 0)
-            following = _following(frame)
-            state.show(ahead, frame.view if following is None else following.camera, 1)
-        elif ahead is not None:
-            state.forget()
-        elif frame.continuous and plan.variant in (Variant.PREVIOUS, Variant.REPROJECT):
+        first = frame.sample.index == 0
+        if ahead is not None:
+            if same_population(frame.scene, ahead.scene):
+                target = HISTORY_TARGET if _following(frame) is not None else ORACLE_TARGET
+                frame.pool.copy("gbuffer.view_depth", plan.layers, target, 0)
+                state.show(target, ahead, 1)
+        elif first and frame.continuous and plan.variant in (Variant.PREVIOUS, Variant.REPROJECT):
             for layer in range(plan.layers - 1):
-                frame.pool.copy("gbuffer.view_depth", layer, ORACLE_TARGET, layer)
-            state.show(frame.moment, frame.view, plan.layers - 1)
+                frame.pool.copy("gbuffer.view_depth", layer, HISTORY_TARGET, layer)
+            state.show(HISTORY_TARGET, frame.moment, plan.layers - 1)
 
 
 def _previous(frame: Frame) -> Moment:
@@ -117,11 +119,3 @@ def _look_ahead(frame: Frame) -> Moment:
         return Moment(following.scene, frame.jittered(following.camera, first))
     after = film_sample(frame.sample.index + 1, frame.settings.filter_radius, frame.settings.seed)
     return Moment(frame.scene, frame.jittered(frame.view, after))
-
-
-def _jitter_between(frame: Frame, oracle: Moment) -> tuple[float, float]:
-    """Pixels (x, y) from where `_previous` shows a point to where the oracle does: they differ in jitter alone."""
-    left, right, bottom, top = _previous(frame).camera.window
-    oracle_left, _, oracle_bottom, _ = oracle.camera.window
-    width, height = frame.pool.size
-    return (left - oracle_left) / (right - left) * width, (bottom - oracle_bottom) / (top - bottom) * height

@@ -10,7 +10,7 @@ from ...scene import Moment, Variant
 from ...scene.history import is_cut
 from ..device import Device
 from ..layout import CHANNELS
-from ..plan import ORACLE_SCRATCH, ORACLE_TARGET, PlannedPass
+from ..plan import HISTORY_TARGET, ORACLE_SCRATCH, ORACLE_TARGET, PlannedPass
 from ..programs import ProgramSpec
 from .base import Frame
 from .rasterize import GeometryProgram, GeometryView, Rasterizer
@@ -38,42 +38,50 @@ class OraclePass:
         """Peel the layers that are not known yet."""
         state = frame.oracle
         moment = frame.moment
-        if not (state.shows(moment) or _carries(frame)):
-            if frame.history is not None:
-                moment = Moment(frame.history.scene, frame.jittered(frame.history.camera, frame.sample))
-            state.show(moment, frame.view, 0)
-        for layer in range(state.layers, frame.plan.layers - 1):
+        state.source = ORACLE_TARGET
+        if not state.shows(ORACLE_TARGET, moment):
+            if state.shows(HISTORY_TARGET, moment) or _carries(frame):
+                state.source = HISTORY_TARGET
+            else:
+                if frame.history is not None:
+                    moment = Moment(frame.history.scene, frame.jittered(frame.history.camera, frame.sample))
+                state.show(ORACLE_TARGET, moment, 0)
+        for layer in range(state.shown.layers, frame.plan.layers - 1):
             self._peel(frame, moment, layer)
-        state.layers = frame.plan.layers - 1
+        state.complete(frame.plan.layers - 1)
 
     def release(self) -> None:
         """Free the pass's uniforms."""
         self._rasterizer.release()
 
     def _peel(self, frame: Frame, moment: Moment, layer: int) -> None:
-        target = ORACLE_SCRATCH if layer > 0 else ORACLE_TARGET
-        program = GeometryProgram(_VIEW_DEPTH, frozenset({"ORACLE"} if layer > 0 else ()), layering=frame.layering)
+        """Draw one layer of the oracle, depth only."""
+        source = frame.oracle.source
+        target = ORACLE_SCRATCH if layer > 0 else source
         view = GeometryView(
             moment,
-            program,
+            GeometryProgram(_VIEW_DEPTH, frozenset({"ORACLE"} if layer > 0 else ()), layering=frame.layering),
             targets=(target,),
             into=0,
             first_layer=layer,
-            oracle=frame.pool.texture(ORACLE_TARGET) if layer > 0 else None,
+            oracle=frame.pool.texture(source) if layer > 0 else None,
         )
         self._rasterizer.draw(frame, view)
         if layer > 0:
-            frame.pool.copy(ORACLE_SCRATCH, 0, ORACLE_TARGET, layer)
+            frame.pool.copy(ORACLE_SCRATCH, 0, source, layer)
 
 
 def _carries(frame: Frame) -> bool:
-    """Whether the depth that the last picture left serves although it shows another moment."""
-    state = frame.oracle
-    return (
-        frame.continuous
-        and frame.sample.index == 0
-        and frame.plan.variant in (Variant.PREVIOUS, Variant.PREDICT, Variant.REPROJECT)
-        and state.moment is not None
-        and state.has_moved(Moment(frame.scene, frame.view))
-        and not is_cut(state.moment, frame.moment)
-    )
+    """Whether the depth that the last view left serves although it shows another moment."""
+    left, previous = frame.oracle.history, frame.previous
+    if left is None or previous is None or not frame.continuous or frame.sample.index > 0:
+        return False
+    if not _has_moved(Moment(frame.scene, frame.view), previous) or is_cut(previous, frame.moment):
+        return False
+    if frame.plan.variant is Variant.PREDICT:
+        return True
+    return frame.plan.variant in (Variant.PREVIOUS, Variant.REPROJECT) and not _has_moved(left, previous)
+
+
+def _has_moved(now: Moment, before: Moment) -> bool:
+    return now.scene is not before.scene or not now.camera.sees_as(before.camera)

@@ -34,7 +34,6 @@ GBUFFER_UNIFORMS = UniformBlock(
         *((f"previous_{name}", glsl_type) for name, glsl_type in _EYE),
         *((f"next_{name}", glsl_type) for name, glsl_type in _EYE),
         ("resolution", "vec2"),
-        ("oracle_offset", "vec2"),  # pixels from where a point was to where the oracle saw it
         ("oracle_drift", "float"),  # pixels, at most 1, that surfaces may have moved since the oracle saw them
         ("minimum_separation", "float"),  # m
         ("relative_separation", "float"),  # share of the nearer layer's view depth
@@ -110,9 +109,9 @@ class GeometryView:
 
     `moment`: whose geometry is drawn, through which camera. `targets` that the program writes: their layer `into`, or
     all their layers where that is None. `first_layer`: which layer of the deep G-buffer comes first.
-    `oracle`: what the program tests against; that of layer k is its layer k − `oracle_layer_offset`, seen
-    `oracle_offset` pixels aside, at most `oracle_drift` pixels ago. `previous`, `following`: the other frames that the
-    program needs.
+    `oracle`: what the program tests against; that of layer k is its layer k − `oracle_layer_offset`.
+    `oracle_drift`: pixels, at most 1, that surfaces may have moved since it saw them.
+    `previous`, `following`: the other frames that the program needs.
     """
 
     moment: Moment
@@ -122,7 +121,6 @@ class GeometryView:
     first_layer: int = 0
     oracle: moderngl.TextureArray | None = None
     oracle_layer_offset: int = 1
-    oracle_offset: tuple[float, float] = (0.0, 0.0)
     oracle_drift: float = 0.0
     previous: Moment | None = None
     following: Moment | None = None
@@ -195,7 +193,6 @@ class Rasterizer:
             **self._eye("previous_", view.previous.camera if view.previous else camera),
             **self._eye("next_", view.following.camera if view.following else camera),
             resolution=frame.pool.size,
-            oracle_offset=view.oracle_offset,
             oracle_drift=view.oracle_drift,
             minimum_separation=0.0 if settings.relative_separation else separation,
             relative_separation=separation if settings.relative_separation else 0.0,
