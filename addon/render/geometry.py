@@ -74,11 +74,12 @@ class PoseTexture:
     def __init__(self, context: moderngl.Context, batch: InstanceBatch, matrices: Float64Array) -> None:
         self.matrices = matrices  # kept alive: it is known by identity
         rows, low = _split_poses(matrices[drawing_order(batch)])
-        height = max(-(-batch.count // _POSES_PER_ROW), 1)
-        texels = np.zeros((height * _POSES_PER_ROW, _TEXELS_PER_POSE, 4), np.float32)
+        per_row = min(max(batch.count, 1), _POSES_PER_ROW)
+        height = max(-(-batch.count // per_row), 1)
+        texels = np.zeros((height * per_row, _TEXELS_PER_POSE, 4), np.float32)
         texels[: batch.count, :3] = rows
         texels[: batch.count, 3, :3] = low
-        self.texture = context.texture((_POSES_PER_ROW * _TEXELS_PER_POSE, height), 4, texels, dtype="f4")
+        self.texture = context.texture((per_row * _TEXELS_PER_POSE, height), 4, texels, dtype="f4")
         self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self.bytes = texels.nbytes
 

@@ -319,8 +319,8 @@ def _plan_composite(scene: Scene, settings: RenderSettings, direct: PlannedPass 
         defines.add("SPECULAR")
     reads = {"view_depth"}.union(*(_FILM_CHANNELS[channel] for channel in settings.channels & MEAN_CHANNELS))
     targets = [f"gbuffer.{name}" for name in sorted(reads)]
-    if _debug_target(settings) and _debug_target(settings) not in targets:
-        targets.append(_debug_target(settings))
+    shown = [_debug_target(settings), *(["exit.view_depth"] if _debug_target(settings).startswith("exit.") else [])]
+    targets += [name for name in dict.fromkeys(shown) if name and name not in targets]
     if defines & {"DIRECT", "DEBUG_DIRECT"}:
         targets.append("direct.radiance")
     writes = tuple(
