@@ -5,9 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from addon.scene import Camera, InstanceBatch, Light, LightKind, Material, Mesh, Scene, SlotRange, World
+from addon.scene import Camera, Image, InstanceBatch, Light, LightKind, Material, Mesh, Scene, SlotRange, World
 
 DIFFUSE = Material("white", "white", 1, base_color=(0.5, 0.5, 0.5), specular=0.0)
+
+_BOX_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float32)
+_BOX_QUADS = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]], np.uint32)
+_BOX_TRIANGLES = np.concatenate([_BOX_QUADS[:, [0, 1, 2]], _BOX_QUADS[:, [0, 2, 3]]])
 
 
 def mesh(key, positions, triangles, normals=None, uvs=None, colors=None, slots=None):
@@ -37,6 +41,12 @@ def quad(key, z=0.0, half=1.0, center=(0.0, 0.0), **arguments):
     corners = [(x - half, y - half, z), (x + half, y - half, z), (x + half, y + half, z), (x - half, y + half, z)]
     arguments.setdefault("uvs", [(0, 0), (1, 0), (1, 1), (0, 1)])
     return mesh(key, corners, [(0, 1, 2), (0, 2, 3)], **arguments)
+
+
+def box(key, half=1.0, **arguments):
+    """A closed box about the origin whose faces look outwards; without vertex normals."""
+    arguments.setdefault("normals", np.zeros((8, 3)))
+    return mesh(key, _BOX_CORNERS * np.float32(half), _BOX_TRIANGLES, **arguments)
 
 
 def translation(x=0.0, y=0.0, z=0.0):
@@ -80,3 +90,10 @@ def light(kind=LightKind.POINT, position=(0.0, 0.0, 2.0), emission=(10.0, 10.0, 
 def material(key="white", **arguments):
     """A purely diffuse material with some properties changed."""
     return replace(DIFFUSE, key=key, name=key, **arguments)
+
+
+def pierced(generator, key="pierced", size=4):
+    """An image of opaque and wholly transparent texels of random colours."""
+    pixels = generator.integers(0, 256, (size, size, 4)).astype(np.uint8)
+    pixels[..., 3] = np.where(generator.random((size, size)) < 0.5, 0, 255)
+    return Image(key, key, 1, pixels, srgb=True)

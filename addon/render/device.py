@@ -34,7 +34,10 @@ class RenderError(RuntimeError):
 
 
 class Device:
-    """An OpenGL ≥ 4.10 core context and what is shared by every view: its programs, tables and limits."""
+    """An OpenGL ≥ 4.10 core context and what is shared by every view: its programs, tables and limits.
+
+    `subpixel`: pixels between the places that vertices snap to.
+    """
 
     def __init__(self) -> None:
         self.context = _create_context()
@@ -50,6 +53,7 @@ class Device:
         self.vertex_layer_extension = vertex_layer_extension(self.context)
         self.fastest_layering: Layering | None = None
         self.idle_queries: list[moderngl.Query] = []
+        self.subpixel = 2.0 ** -self.context.info["GL_SUBPIXEL_BITS"]
         self.uniform_alignment: int = self.context.info["GL_UNIFORM_BUFFER_OFFSET_ALIGNMENT"]
 
     def out_of_memory(self) -> bool:

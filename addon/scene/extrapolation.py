@@ -73,7 +73,9 @@ def _continued_batch(correspondence: Correspondence, batch: InstanceBatch) -> In
 def _continued_camera(earlier: Camera, previous: Camera) -> Camera:
     pose = previous.world_from_camera
     if not np.array_equal(earlier.world_from_camera, pose):
-        pose = _rigid(_continued(earlier.world_from_camera[None], pose[None])[0])
+        turned = not np.array_equal(earlier.rotation, previous.rotation)
+        pose = _continued(earlier.world_from_camera[None], pose[None])[0]
+        pose = _rigid(pose) if turned else pose
     window = previous.window
     if earlier.orthographic == previous.orthographic and earlier.window != window:
         window = _continued_window(np.array(earlier.window), np.array(window))

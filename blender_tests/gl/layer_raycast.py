@@ -3,7 +3,7 @@
 
 It shares nothing with the renderer but the scene contract: every pixel centre's ray is intersected with every
 triangle, the hits are sorted, and layers are selected greedily: Z(0) is the nearest hit, Z(k+1) the nearest one with
-z > Z(k) + Δz.
+z > Z(k) + Δz. The exit surface of layer k is the nearest back face with z > Z(k) + 4 ulp, whatever Δz is.
 
 Where the answer may depend on rounding, the pixel is `ambiguous`. With u = 2⁻²⁴ and s sub-pixel bits:
 
@@ -37,25 +37,72 @@ Bools = NDArray[np.bool_]
 @dataclass(frozen=True)
 class LayerReference:
     """`depth` (n, H, W), +inf where empty; `tolerance` (n, H, W) of those depths; `owner` (n, H, W) int: pass index
-    of the instance hit, 0 where empty; `normal` (n, H, W, 3) geometric, of either sign; `ambiguous` (H, W)."""
+    of the instance hit, 0 where empty; `normal` (n, H, W, 3) geometric, of either sign; `triangle` (n, H, W) int:
+    position in `camera_triangles`, −1 where empty; `ambiguous` (H, W). `exits`: the same of the exit surfaces, or None
+    of such; ambiguous as well where the layers are."""
 
     depth: Floats
     tolerance: Floats
     owner: NDArray[np.int64]
     normal: Floats
+    triangle: NDArray[np.int64]
     ambiguous: Bools
+    exits: "LayerReference | None" = None
 
 
 @dataclass(frozen=True)
 class _Hits:
     """All triangles against all pixels: `depth` (T, P), +inf where missed; `tolerance` (T, P); `unsure` (P,) where
-    coverage or clipping may go either way; `owner` (T,) pass indices; `normal` (T, 3) in world space."""
+    coverage or clipping may go either way; `owner` (T,) pass indices; `normal` (T, 3) in world space; `triangle` (T,)
+    positions in `camera_triangles`; `back` (T,) whether the viewer sees the back."""
 
     depth: Floats
     tolerance: Floats
     unsure: Bools
     owner: NDArray[np.int64]
     normal: Floats
+    triangle: NDArray[np.int64]
+    back: Bools
+
+
+class _Selection:
+    """Which hit each layer takes at each pixel, row by row."""
+
+    def __init__(self, hits: _Hits, layers: int) -> None:
+        self.hits, self.pixels = hits, np.arange(hits.unsure.size)
+        shape = (layers, hits.unsure.size)
+        self.depth, self.tolerance = np.full(shape, np.inf), np.zeros(shape)
+        self.owner, self.triangle = np.zeros(shape, np.int64), np.full(shape, -1)
+        self.normal = np.zeros((*shape, 3))
+
+    def take(self, layer: int, depths: Floats) -> tuple[NDArray[np.int64], Bools]:
+        """Put the nearest of `depths` (T, P) into a layer; returns its triangles (P,) and whether there is one (P,).
+
+        The second result also tells where another one is as near, as far as rounding goes.
+        """
+        chosen = depths.argmin(axis=0)
+        nearest, error = depths[chosen, self.pixels], self.hits.tolerance[chosen, self.pixels]
+        found = np.isfinite(nearest)
+        self.depth[layer], self.tolerance[layer] = nearest, np.where(found, error, 0.0)
+        self.owner[layer] = np.where(found, self.hits.owner[chosen], 0)
+        self.triangle[layer] = np.where(found, self.hits.triangle[chosen], -1)
+        self.normal[layer] = np.where(found[:, None], self.hits.normal[chosen], 0.0)
+        others = depths.copy()
+        others[chosen, self.pixels] = np.inf
+        return chosen, _any_within(others, nearest, self.hits.tolerance + error) & found
+
+    def reference(self, size: tuple[int, int], ambiguous: Bools, exits: LayerReference | None) -> LayerReference:
+        """All layers as pictures."""
+        shape = (len(self.depth), size[1], size[0])
+        return LayerReference(
+            self.depth.reshape(shape),
+            self.tolerance.reshape(shape),
+            self.owner.reshape(shape),
+            self.normal.reshape(*shape, 3),
+            self.triangle.reshape(shape),
+            ambiguous.reshape(shape[1:]),
+            exits,
+        )
 
 
 @dataclass(frozen=True)
@@ -72,35 +119,33 @@ def raycast_layers(
     scene: Scene, camera: Camera, size: tuple[int, int], layers: int, separation: float, *, subpixel_bits: int
 ) -> LayerReference:
     """The layers of `scene` through the pixel centres of a picture of `size` (width, height), row 0 at the bottom."""
-    width, height = size
-    hits = _intersect(scene, camera, width, height, subpixel_bits)
-    rows = np.arange(width * height)
+    hits = _intersect(scene, camera, *size, subpixel_bits)
     ambiguous = hits.unsure.copy()
-    depth = np.full((layers, rows.size), np.inf)
-    tolerance = np.zeros((layers, rows.size))
-    owner = np.zeros((layers, rows.size), np.int64)
-    normal = np.zeros((layers, rows.size, 3))
+    selection, exits = _Selection(hits, layers), _Selection(hits, layers)
     remaining = hits.depth.copy()
+    exits_ambiguous = np.zeros_like(ambiguous)
     for layer in range(layers if len(remaining) else 0):
-        chosen = remaining.argmin(axis=0)
-        nearest, error = remaining[chosen, rows], hits.tolerance[chosen, rows]
-        found = np.isfinite(nearest)
-        remaining[chosen, rows] = np.inf
-        ambiguous |= _any_within(remaining, nearest, hits.tolerance + error) & found
-        depth[layer], tolerance[layer] = nearest, np.where(found, error, 0.0)
-        owner[layer] = np.where(found, hits.owner[chosen], 0)
-        normal[layer] = np.where(found[:, None], hits.normal[chosen], 0.0)
-        threshold = nearest + separation
-        ambiguous |= _any_within(remaining, threshold, hits.tolerance + error + UNIT_ROUNDOFF * threshold) & found
+        chosen, tied = selection.take(layer, remaining)
+        depth, error = selection.depth[layer], selection.tolerance[layer]
+        found = np.isfinite(depth)
+        remaining[chosen, selection.pixels] = np.inf
+        threshold = depth + separation
+        tied |= _any_within(remaining, threshold, hits.tolerance + error + UNIT_ROUNDOFF * threshold) & found
+        ambiguous |= tied
+        exits_ambiguous |= _take_exits(exits, layer, chosen, depth, error)
         remaining[remaining <= threshold] = np.inf
-    shape = (layers, height, width)
-    return LayerReference(
-        depth.reshape(shape),
-        tolerance.reshape(shape),
-        owner.reshape(shape),
-        normal.reshape(*shape, 3),
-        ambiguous.reshape(height, width),
-    )
+    return selection.reference(size, ambiguous, exits.reference(size, ambiguous | exits_ambiguous, None))
+
+
+def _take_exits(exits: _Selection, layer: int, chosen: NDArray[np.int64], depth: Floats, error: Floats) -> Bools:
+    """Select the back faces behind a layer's `depth` (P,), which triangles `chosen` (P,) have; (P,) where unsure."""
+    found = np.isfinite(depth)
+    behind = np.where(exits.hits.back[:, None] & found, exits.hits.depth, np.inf)
+    behind[chosen, exits.pixels] = np.inf
+    guard = 8.0 * UNIT_ROUNDOFF * depth
+    unsure = _any_within(behind, depth, exits.hits.tolerance + error + np.where(found, guard, 0.0))
+    behind[behind <= depth + guard] = np.inf
+    return unsure | exits.take(layer, behind)[1]
 
 
 def _any_within(values: Floats, center: Floats, tolerance: Floats) -> Bools:
@@ -114,9 +159,9 @@ def _any_within(values: Floats, center: Floats, tolerance: Floats) -> Bools:
 def _intersect(scene: Scene, camera: Camera, width: int, height: int, subpixel_bits: int) -> _Hits:
     pixels = _pixel_centres(camera, width, height)
     count = width * height
-    depths, tolerances, owners, normals = [], [], [], []
+    depths, tolerances, owners, normals, triangles, backs = [], [], [], [], [], []
     unsure = np.zeros(count, bool)
-    for corners, error, index in _camera_triangles(scene, camera):
+    for number, (corners, error, index, handedness) in enumerate(camera_triangles(scene, camera)):
         normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
         length = np.linalg.norm(normal)
         if length == 0.0:
@@ -137,12 +182,17 @@ def _intersect(scene: Scene, camera: Camera, width: int, height: int, subpixel_b
         tolerances.append(np.where(inside, tolerance, 0.0))
         owners.append(index)
         normals.append(camera.rotation @ (normal / length * (1.0, 1.0, -1.0)))
+        triangles.append(number)
+        # With depth as z, space is mirrored: the cross product of a front face's sides points away from the viewer.
+        backs.append(handedness * (normal[2] if camera.orthographic else normal @ corners[0]) < 0.0)
     return _Hits(
         np.array(depths).reshape(-1, count),
         np.array(tolerances).reshape(-1, count),
         unsure,
         np.array(owners, np.int64),
         np.array(normals).reshape(-1, 3),
+        np.array(triangles, np.int64),
+        np.array(backs, bool),
     )
 
 
@@ -155,8 +205,11 @@ def _pixel_centres(camera: Camera, width: int, height: int) -> _Pixels:
     return _Pixels(origin + raster / scale, raster, scale, origin)
 
 
-def _camera_triangles(scene: Scene, camera: Camera) -> Iterator[tuple[Floats, float, int]]:
-    """Yields ((3, 3) corners in camera space with positive depth as z, vertex error e (m), pass index)."""
+def camera_triangles(scene: Scene, camera: Camera) -> Iterator[tuple[Floats, float, int, float]]:
+    """Yields ((3, 3) corners in camera space with positive depth as z, vertex error e (m), pass index, handedness).
+
+    Handedness is −1 where the instance is mirrored, which turns clockwise triangles into front faces.
+    """
     camera_from_world = np.eye(4)
     camera_from_world[:3, :3] = camera.rotation.T
     for batch in scene.batches:
@@ -167,9 +220,10 @@ def _camera_triangles(scene: Scene, camera: Camera) -> Iterator[tuple[Floats, fl
             relative[:3, 3] -= camera.position
             camera_from_object = (camera_from_world @ relative)[:3]
             corners = positions @ camera_from_object.T * (1.0, 1.0, -1.0)
+            handedness = -1.0 if np.linalg.det(matrix[:3, :3]) < 0.0 else 1.0
             error = ROUNDINGS * UNIT_ROUNDOFF * (np.abs(positions) @ np.abs(camera_from_object).T).max(axis=1)
             for triangle in mesh.triangles:
-                yield corners[triangle], error[triangle].max(), int(index)
+                yield corners[triangle], error[triangle].max(), int(index), handedness
 
 
 def _clip_near(corners: Floats, near: float) -> Floats:

@@ -1,85 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bad input, end to end: the picture still comes, it is finite, and a warning names what was wrong."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
 import numpy as np
-import OpenEXR
 import pytest
 from mathutils import Matrix
-
-import addon
-
-GOOD, BAD = "Good plane", "Troubled object"
-
-
-@pytest.fixture(scope="module", autouse=True)
-def registered() -> Iterator[None]:
-    """The add-on, for all tests of the module."""
-    addon.register()
-    yield
-    addon.unregister()
-
-
-@pytest.fixture
-def scene() -> bpy.types.Scene:
-    """A lit plane that fills the lower half of a small picture."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    result = bpy.context.scene
-    result.render.engine = "DEEP_GBUFFER"
-    result.render.resolution_x, result.render.resolution_y, result.render.resolution_percentage = 32, 24, 100
-    result.deep_gbuffer.samples = 2
-    layer = result.view_layers[0]
-    for name in ("z", "normal", "position", "diffuse_color"):
-        setattr(layer, f"use_pass_{name}", True)
-    add(GOOD, [(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [(0, 1, 2, 3)])
-    light = bpy.data.lights.new("Sun", "SUN")
-    result.collection.objects.link(bpy.data.objects.new("Sun", light))
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.location, camera.rotation_euler = (0.0, -4.0, 1.0), (1.57, 0.0, 0.0)
-    result.collection.objects.link(camera)
-    result.camera = camera
-    return result
-
-
-def add(name: str, vertices: list[tuple[float, float, float]], faces: list[tuple[int, ...]]) -> bpy.types.Object:
-    """A mesh object; nothing is repaired."""
-    mesh = bpy.data.meshes.new(name)
-    mesh.from_pydata(vertices, [], faces)
-    result = bpy.data.objects.new(name, mesh)
-    bpy.context.scene.collection.objects.link(result)
-    return result
-
-
-def render(scene: bpy.types.Scene, folder: Path) -> tuple[dict[str, np.ndarray], list[str]]:
-    """Every channel of the final render and the warnings that came with it."""
-    image = scene.render.image_settings
-    if bpy.app.version >= (5, 0, 0):
-        image.media_type = "MULTI_LAYER_IMAGE"
-    image.file_format, image.color_depth = "OPEN_EXR_MULTILAYER", "32"
-    scene.render.filepath = str(folder / "out.exr")
-    assert bpy.ops.render.render(write_still=True, scene=scene.name) == {"FINISHED"}
-    statistics = addon.engine.statistics.last(scene.name)
-    with OpenEXR.File(scene.render.filepath, separate_channels=True) as file:
-        channels = {name: np.array(item.pixels) for part in file.parts for name, item in part.channels.items()}
-    return channels, statistics["warnings"]
-
-
-def assert_good_picture(channels: dict[str, np.ndarray]) -> None:
-    """Finite everywhere, and the plane in the lower half is there and lit."""
-    for name, pixels in channels.items():
-        assert np.isfinite(pixels).all(), f"{name} is not finite"
-    red = next(pixels for name, pixels in channels.items() if name.endswith("Combined.R"))
-    depth = next(pixels for name, pixels in channels.items() if name.endswith("Depth.Z"))
-    assert (red[-4:] > 0.01).all(), "the good plane must be lit"
-    assert (depth[-4:] < 1e9).all(), "the good plane must be there"
-
-
-def assert_named(warnings: list[str]) -> None:
-    """Some warning names the troubled object, in a sentence."""
-    assert any(BAD in text and text.endswith((".", "!")) for text in warnings), warnings
+from troubled_scenes import BAD, GOOD, add, assert_good_picture, assert_named, read_exr, render
 
 
 def not_a_number() -> None:
@@ -170,8 +99,7 @@ def test_odd_sizes_and_extreme_layers(
         assert pixels.shape == size[::-1], name
         assert np.isfinite(pixels).all(), name
     (layer_file,) = (path for path in tmp_path.glob("*.exr") if path.name != "out.exr")
-    with OpenEXR.File(str(layer_file), separate_channels=True) as file:
-        written = {name: np.array(item.pixels) for part in file.parts for name, item in part.channels.items()}
+    written = read_exr(layer_file)
     assert len(written) > 4 * layers
     for name, pixels in written.items():
         assert pixels.shape == size[::-1], name

@@ -49,19 +49,31 @@ vec2 motion_vector()
  * Whether a view depth is within the minimum separation behind the previous layer.
  *
  * `slope`: how much the depth may differ because the oracle was sampled elsewhere. Variants also round differently,
- * by a few units in the last place; without either allowance a surface would be its own next layer.
+ * by a few units in the last place; without both allowances a surface would be its own next layer.
  */
 bool too_near(ivec2 pixel, float view_depth, float slope)
 {
     float nearer = texelFetch(oracle, ivec3(pixel, max(surface.layer - oracle_layer_offset, 0)), 0).r;
-    float guard = max(4.0 * FLOAT_EPSILON * nearer, slope);
+    float guard = 4.0 * FLOAT_EPSILON * nearer + slope;
     return !(view_depth > nearer + (minimum_separation + relative_separation * nearer) + guard);
+}
+
+// Pixels. Farther than this from where the oracle was sampled, a slope says little: off the picture, without guard band.
+const float LARGEST_OFFSET = 1.5;
+
+/** How much a view depth changes per pixel; in perspective its inverse is what is linear on the screen. */
+vec2 depth_change(float depth)
+{
+    if (orthographic != 0)
+        return abs(vec2(dFdx(depth), dFdy(depth)));
+    float inverse = 1.0 / depth;
+    return abs(vec2(dFdx(inverse), dFdy(inverse))) * depth * depth;
 }
 
 /** Whether this fragment is, by what the oracle knows. Derivatives: call where all fragments of a quad do. */
 bool too_near_previous_layer()
 {
-    vec2 offset = vec2(oracle_drift);
+    vec2 offset = vec2(oracle_drift + oracle_snapping);
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     float view_depth = surface.view_depth;
 #ifdef REPROJECT
@@ -70,14 +82,13 @@ bool too_near_previous_layer()
     if (surface.previous.w >= clip_start)
     {
         vec2 origin = gl_FragCoord.xy - motion_vector();
-        origin = clamp(origin, vec2(0.0), resolution - 0.5);
-        pixel = ivec2(origin);
-        offset = abs(origin - (vec2(pixel) + 0.5));
+        pixel = ivec2(clamp(origin, vec2(0.0), resolution - 0.5));
+        offset = min(abs(origin - (vec2(pixel) + 0.5)), LARGEST_OFFSET) + oracle_snapping;
         view_depth = surface.previous.w;
     }
-    vec2 change = abs(vec2(dFdx(surface.previous.w), dFdy(surface.previous.w)));
+    vec2 change = depth_change(surface.previous.w);
 #else
-    vec2 change = abs(vec2(dFdx(surface.view_depth), dFdy(surface.view_depth)));
+    vec2 change = depth_change(surface.view_depth);
 #endif
     return too_near(pixel, view_depth, dot(change, offset));
 }

@@ -74,7 +74,7 @@ class GBufferPass:
             GeometryProgram(channels, frozenset(defines), plan.drawn_layers, frame.layering),
             targets=tuple(channel.target_name for channel in channels),
             oracle=frame.pool.texture(state.source),
-            oracle_drift=0.0 if exact or reprojects else pixel_drift(shown, frame.moment, *frame.pool.size),
+            oracle_drift=0.0 if exact else pixel_drift(shown, frame.moment, *frame.pool.size),
             previous=_previous(frame),
             following=ahead,
         )

@@ -35,6 +35,7 @@ GBUFFER_UNIFORMS = UniformBlock(
         *((f"next_{name}", glsl_type) for name, glsl_type in _EYE),
         ("resolution", "vec2"),
         ("oracle_drift", "float"),  # pixels, at most 1, that surfaces may have moved since the oracle saw them
+        ("oracle_snapping", "float"),  # pixels between vertices that two frames snap to the sub-pixel grid
         ("minimum_separation", "float"),  # m
         ("relative_separation", "float"),  # share of the nearer layer's view depth
         ("clip_start", "float"),
@@ -194,6 +195,7 @@ class Rasterizer:
             **self._eye("next_", view.following.camera if view.following else camera),
             resolution=frame.pool.size,
             oracle_drift=view.oracle_drift,
+            oracle_snapping=2.0 * self._device.subpixel if view.oracle_drift > 0.0 else 0.0,
             minimum_separation=0.0 if settings.relative_separation else separation,
             relative_separation=separation if settings.relative_separation else 0.0,
             clip_start=camera.clip_start,
