@@ -11,7 +11,7 @@ import numpy as np
 from ..scene import InstanceBatch, Mesh, Scene
 from ..scene.arrays import Float32Array, Float64Array, Int64Array
 from ..scene.correspondence import Correspondence
-from .device import Device
+from .device import Device, RenderError
 
 MESH_ATTRIBUTES = ("3f", "in_position"), ("3f", "in_normal"), ("2f", "in_uv"), ("4f", "in_color")
 INSTANCE_FORMAT = "4f 4f 4f 3f 1i/i"
@@ -107,8 +107,14 @@ def split_float64(values: Float64Array) -> tuple[Float32Array, Float32Array]:
 
 
 def drawing_order(batch: InstanceBatch) -> Int64Array:
-    """The rows (N,) of a batch in the order of their ids: coincident instances do not depend on who came first."""
-    return np.argsort(batch.ids, kind="stable")
+    """The rows (N,) of a batch by what they hold: coincident instances depend neither on who came first nor on ids,
+    which are others each time a file is opened."""
+    columns = (batch.object_index, *batch.matrices[:, :3, 3].T)
+    order = np.lexsort(columns)
+    ties = np.all([column[order[1:]] == column[order[:-1]] for column in columns], axis=0)
+    if ties.any():
+        order = np.lexsort((*batch.matrices[:, :3, :3].reshape(-1, 9).T, *columns))
+    return order
 
 
 def pack_instances(batch: InstanceBatch) -> bytes:
@@ -148,17 +154,22 @@ class _Uploads(Generic[T]):
         """The thing of a key, made where it is not there. Raises RenderError with its label where memory is short."""
         self.used.add(key)
         if key not in self._held:
-            made = self._held[key] = make()
-            self._device.check_upload(label, made.bytes)
+            made = make()
+            try:
+                self._device.check_upload(label, made.bytes)
+            except RenderError:
+                made.release()
+                raise
+            self._held[key] = made
         return self._held[key]
 
-    def keep(self, keys: set[Hashable]) -> bool:
-        """Free all others and forget what was used; whether any was freed."""
+    def keep(self, keys: set[Hashable]) -> set[Hashable]:
+        """Free all others and forget what was used; returns the keys of those that were freed."""
         stale = self._held.keys() - keys
         for key in stale:
             self._held.pop(key).release()
         self.used = set()
-        return bool(stale)
+        return stale
 
     def bytes(self) -> int:
         """Bytes of all that is held."""
@@ -175,7 +186,7 @@ class GeometryStore:
         self._batches = _Uploads[InstanceBuffer](device)
         self._positions = _Uploads[PositionBuffer](device)
         self._poses = _Uploads[PoseTexture](device)
-        self._vertex_arrays: dict[Hashable, moderngl.VertexArray] = {}
+        self._vertex_arrays: dict[tuple[Hashable, ...], moderngl.VertexArray] = {}
 
     def update(self, scenes: Sequence[Scene]) -> None:
         """Mirror these scenes, and of other times what was drawn since the last update.
@@ -184,14 +195,9 @@ class GeometryStore:
         """
         meshes = {_mesh_key(mesh) for scene in scenes for mesh in _drawn_meshes(scene)}
         batches = {_batch_key(batch) for scene in scenes for batch in scene.batches}
-        freed = (
-            self._meshes.keep(meshes),
-            self._batches.keep(batches),
-            self._positions.keep(self._positions.used),
-            self._poses.keep(self._poses.used),
-        )
-        if any(freed):
-            self._release_vertex_arrays()
+        self._poses.keep(self._poses.used)
+        freed = self._meshes.keep(meshes) | self._batches.keep(batches) | self._positions.keep(self._positions.used)
+        self._release_vertex_arrays(freed)
         for scene in scenes:
             for mesh in _drawn_meshes(scene):
                 self._mesh(mesh)
@@ -204,16 +210,17 @@ class GeometryStore:
         """The vertex array that draws a batch of a scene with a program, each instance `copies` times in a row."""
         mesh = scene.meshes[batch.mesh]
         moved = [
-            (self._positions_at(mesh, other), name)
+            (other.positions(mesh), name)
             for other, name in ((times.previous, "in_previous_position"), (times.following, "in_next_position"))
             if other is not None and name in program
         ]
-        names = tuple(buffer.glo for buffer, _ in moved)
-        key = (_batch_key(batch), _mesh_key(mesh), program, names, copies)
+        other_places = [_positions_key(mesh, places) for places, _ in moved]
+        self._positions.used.update(other_places)
+        key = (_batch_key(batch), _mesh_key(mesh), *other_places, program, copies)
         if key not in self._vertex_arrays:
             buffers = self._mesh(mesh)
             content: list[tuple[Any, ...]] = [attribute for attribute in buffers.attributes if attribute[2] in program]
-            content += [(buffer, "3f", name) for buffer, name in moved]
+            content += [(self._positions_at(mesh, places), "3f", name) for places, name in moved]
             used = [name for name in INSTANCE_ATTRIBUTES if name in program]
             instance_layout = INSTANCE_FORMAT if "in_object_index" in program else "4f 4f 4f 3f 4x/i"
             content.append((self._batch(batch).buffer, instance_layout, *used))
@@ -238,7 +245,9 @@ class GeometryStore:
 
     def release(self) -> None:
         """Free everything."""
-        self._release_vertex_arrays()
+        for vertex_array in self._vertex_arrays.values():
+            vertex_array.release()
+        self._vertex_arrays.clear()
         for uploads in (self._meshes, self._batches, self._positions, self._poses):
             uploads.keep(set())
 
@@ -249,17 +258,17 @@ class GeometryStore:
         label = f'{batch.count} instances of mesh "{batch.mesh}"'
         return self._batches.get(_batch_key(batch), lambda: InstanceBuffer(self._context, batch), label)
 
-    def _positions_at(self, mesh: Mesh, other: Correspondence) -> moderngl.Buffer:
-        positions = other.positions(mesh)
+    def _positions_at(self, mesh: Mesh, positions: Float32Array) -> moderngl.Buffer:
         if positions is mesh.positions:
             return self._mesh(mesh).attributes[0][0]
         label = f'earlier or later vertices of mesh "{mesh.name}"'
-        return self._positions.get(id(positions), lambda: PositionBuffer(self._context, positions), label).buffer
+        key = _positions_key(mesh, positions)
+        return self._positions.get(key, lambda: PositionBuffer(self._context, positions), label).buffer
 
-    def _release_vertex_arrays(self) -> None:
-        for vertex_array in self._vertex_arrays.values():
-            vertex_array.release()
-        self._vertex_arrays.clear()
+    def _release_vertex_arrays(self, of: set[Hashable]) -> None:
+        """Free those that read anything whose key is among `of`."""
+        for key in [key for key in self._vertex_arrays if of and not of.isdisjoint(key)]:
+            self._vertex_arrays.pop(key).release()
 
 
 def _drawn_meshes(scene: Scene) -> list[Mesh]:
@@ -267,8 +276,12 @@ def _drawn_meshes(scene: Scene) -> list[Mesh]:
 
 
 def _mesh_key(mesh: Mesh) -> Hashable:
-    return mesh.key, mesh.version
+    return "mesh", mesh.key, mesh.version
 
 
 def _batch_key(batch: InstanceBatch) -> Hashable:
-    return batch.key, batch.version
+    return "batch", batch.key, batch.version
+
+
+def _positions_key(mesh: Mesh, positions: Float32Array) -> Hashable:
+    return _mesh_key(mesh) if positions is mesh.positions else ("positions", id(positions))

@@ -7,7 +7,7 @@ import moderngl
 import numpy as np
 
 from ..scene import Extension, Image, ImageTexture, Interpolation
-from .device import Device
+from .device import Device, RenderError
 from .raw_gl import SRGB8_ALPHA8
 
 
@@ -71,7 +71,11 @@ class ImageStore:
             internal_format=SRGB8_ALPHA8 if image.srgb and not is_float else None,
         )
         texture.build_mipmaps()
-        self._device.check_upload(f'image "{image.name}"', pixels.nbytes)
+        try:
+            self._device.check_upload(f'image "{image.name}"', pixels.nbytes)
+        except RenderError:
+            texture.release()
+            raise
         return texture
 
     def _sampler(self, texture: ImageTexture) -> moderngl.Sampler:

@@ -3,12 +3,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 
 from ..scene import Camera, InstanceBatch, Layering, Material, Mesh, RenderSettings, Scene, SlotRange, Variant
 from ..scene.versions import new_version
 from .device import Device, RenderError
+from .programs import ShaderError
 
 _GRID = 80
 _SAMPLES = 4
@@ -23,7 +25,7 @@ class Trial:
 
 
 def resolved(settings: RenderSettings, device: Device, attempt: Callable[[RenderSettings], Trial]) -> Layering:
-    """The way to take: what is asked for, or what is best on the device, found once by `attempt` at rendering.
+    """The way to take: what is asked for, or what is best on the device, found once per process by rendering.
 
     Raises RenderError where the driver does not have what is asked for.
     """
@@ -45,9 +47,17 @@ def _fastest(device: Device, attempt: Callable[[RenderSettings], Trial]) -> Laye
         return Layering.GEOMETRY_SHADER
     separate = attempt(calibration_settings(Variant.TWO_PASS, Layering.VERTEX_SHADER)).bits
     ways = (Layering.VERTEX_SHADER, Layering.GEOMETRY_SHADER)
-    trials = {way: attempt(calibration_settings(Variant.PREPASS, way)) for way in ways}
+    trials = {way: _attempted(attempt, calibration_settings(Variant.PREPASS, way)) for way in ways}
     equal = [way for way in ways if trials[way].bits == separate]
-    return min(equal or ways[:1], key=lambda way: trials[way].milliseconds)
+    return min(equal or ways, key=lambda way: trials[way].milliseconds)
+
+
+def _attempted(attempt: Callable[[RenderSettings], Trial], settings: RenderSettings) -> Trial:
+    """The trial; one that anything else is better than where the driver's compiler refuses."""
+    try:
+        return attempt(settings)
+    except ShaderError:
+        return Trial(inf, b"")
 
 
 def calibration_settings(variant: Variant, layering: Layering) -> RenderSettings:

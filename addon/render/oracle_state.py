@@ -2,7 +2,7 @@
 """What the oracle's textures show, from one picture to the next."""
 
 from collections.abc import Hashable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from ..scene import Moment
 from .plan import HISTORY_TARGET, ORACLE_TARGET
@@ -10,10 +10,14 @@ from .plan import HISTORY_TARGET, ORACLE_TARGET
 
 @dataclass(frozen=True)
 class ShownLayers:
-    """Whose layers a texture shows, through the camera with its jitter, and how many of them, nearest first."""
+    """Whose layers a texture shows, through the camera with its jitter, and how many of them, nearest first.
+
+    `exact`: how many are those of that moment; the others were found with the depth of another one.
+    """
 
     moment: Moment
     layers: int
+    exact: int
 
 
 @dataclass
@@ -43,15 +47,19 @@ class OracleState:
         """What the source shows."""
         return self.targets[self.source]
 
-    def show(self, target: str, moment: Moment, layers: int) -> None:
+    def show(self, target: str, moment: Moment, layers: int, exact: int | None = None) -> None:
         """A texture shows this now."""
-        self.targets[target] = ShownLayers(moment, layers)
+        self.targets[target] = ShownLayers(moment, layers, layers if exact is None else exact)
 
-    def complete(self, layers: int) -> None:
+    def complete(self, layers: int, *, exact: bool) -> None:
         """The source has all its layers now."""
-        self.targets[self.source] = replace(self.shown, layers=layers)
+        self.show(self.source, self.shown.moment, layers, layers if exact else self.shown.exact)
 
     def shows(self, target: str, moment: Moment) -> bool:
-        """Whether a texture shows exactly this."""
+        """Whether a texture shows exactly this, as far as it does."""
         held = self.targets.get(target)
-        return held is not None and held.moment.scene is moment.scene and held.moment.camera.sees_as(moment.camera)
+        return held is not None and held.moment.equals(moment)
+
+    def is_exact(self, moment: Moment) -> bool:
+        """Whether all layers of the source are those of a moment."""
+        return self.shown.moment.equals(moment) and self.shown.exact == self.shown.layers

@@ -5,7 +5,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf
 
-from ..scene import Channel, DebugView, LightKind, RenderSettings, Scene, Variant
+from ..scene import Channel, DebugView, RenderSettings, Scene, Variant
+from .direct_needs import direct_needs
 from .layout import CHANNELS, EXIT_CHANNELS, GBufferChannel, TargetSpec
 
 
@@ -112,19 +113,20 @@ def plan(scene: Scene, settings: RenderSettings, *, continuous: bool = False) ->
     direct = _plan_direct(scene, settings, layers, left_out)
     channels = _read_channels(scene, settings, direct, layers, left_out)
     one_pass = variant is not Variant.TWO_PASS
+    drawn_layers = layers + look_ahead if one_pass else layers
     gbuffer = PlannedPass(
         "gbuffer",
         reads=("gbuffer.oracle",) if layers > 1 else (),
         # One pass over the geometry writes every channel in every layer it reaches.
         writes=(
-            *(channel.target(layers + look_ahead if one_pass else read) for channel, read in channels),
+            *(channel.target(drawn_layers if one_pass else read) for channel, read in channels),
             *((TargetSpec(ORACLE_TARGET, 1, "f4", 1, inf),) if layers > 1 and not one_pass else ()),
         ),
     )
     passes = [
         *_plan_oracle(variant, layers, left_out, continuous=continuous),
         gbuffer,
-        *_plan_exit(settings, layers + look_ahead if one_pass else layers, left_out),
+        *_plan_exit(settings, drawn_layers, left_out),
         *((direct,) if direct else ()),
         _plan_composite(scene, settings, direct),
     ]
@@ -229,7 +231,7 @@ def _plan_direct(scene: Scene, settings: RenderSettings, layers: int, left_out: 
     if settings.debug_view not in (DebugView.NONE, DebugView.DIRECT) and not settings.deep_output:
         left_out.append(LeftOut("direct", "the debug view shows the G-buffer only"))
         return None
-    needs = _direct_needs(scene)
+    needs = direct_needs(scene)
     left_out += [LeftOut(f"direct {name.lower()}", reason) for name, (wanted, reason) in needs.items() if not wanted]
     reads = ["view_depth"]
     if lit:
@@ -242,37 +244,6 @@ def _plan_direct(scene: Scene, settings: RenderSettings, layers: int, left_out: 
         writes=(TargetSpec("direct.radiance", 4, "f4", layers),),
         defines=frozenset(name for name, (wanted, _) in needs.items() if wanted),
     )
-
-
-DIRECT_DEFINES = (
-    "SUN_LIGHTS",
-    "AREA_LIGHTS",
-    "SPHERE_LIGHTS",
-    "DISK_LIGHTS",
-    "SPOT_CONES",
-    "SPECULAR",
-    "WORLD",
-    "EMISSION",
-)
-"""What the direct pass compiles only where a scene has it: drivers that draw on the CPU run every branch they have."""
-
-
-def _direct_needs(scene: Scene) -> dict[str, tuple[bool, str]]:
-    """Per define of the direct pass, whether the scene needs it, and why not if it does not."""
-    kinds = {light.kind for light in scene.lights}
-    bulbs = {light.soft_falloff for light in scene.lights if light.kind in (LightKind.POINT, LightKind.SPOT)}
-    materials = scene.materials.values()
-    needed = (
-        (LightKind.SUN in kinds, "no sun"),
-        (LightKind.AREA in kinds, "no area light"),
-        (False in bulbs, "no point or spot light without soft falloff"),
-        (True in bulbs, "no point or spot light with soft falloff"),
-        (LightKind.SPOT in kinds, "no spot light"),
-        (any(material.is_glossy for material in materials), "no glossy material"),
-        (max(scene.world.radiance) > 0.0, "the world is black"),
-        (any(material.is_emissive for material in materials), "no emissive material"),
-    )
-    return dict(zip(DIRECT_DEFINES, needed, strict=True))
 
 
 def _read_channels(

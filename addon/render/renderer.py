@@ -53,6 +53,7 @@ class Renderer:
         Raises RenderError where the device cannot hold the targets.
         """
         self._frame = None
+        oracle, self._oracle = self._oracle, OracleState()  # where anything fails, nothing is known any more
         sequence = sequence or Sequence()
         planned = plan(scene, settings, continuous=sequence.continuous)
         self._pool.prepare(
@@ -63,7 +64,7 @@ class Renderer:
         )
         frames = surroundings(Moment(scene, camera), sequence, planned, settings)
         self._upload(scene, frames.history.scene if frames.history else scene, settings.alpha_threshold)
-        self._oracle.begin(oracle_depends_on(settings, planned), continuous=sequence.continuous)
+        oracle.begin(oracle_depends_on(settings, planned), continuous=sequence.continuous)
         self._film.samples = 0
         self._first_sample, self._layers = {}, ()
         self._camera = camera
@@ -74,7 +75,7 @@ class Renderer:
             draws=self._draws,
             images=self._images,
             film=self._film,
-            oracle=self._oracle,
+            oracle=oracle,
             correspondence=self._correspondence,
             scene=scene,
             settings=settings,
@@ -89,6 +90,7 @@ class Renderer:
             continuous=sequence.continuous,
         )
         self._prepare_passes(self._frame)
+        self._oracle = oracle
         return planned
 
     def render_sample(self) -> int:

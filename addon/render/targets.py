@@ -202,7 +202,11 @@ class TexturePool:
             texture = self._device.context.texture_array((*size, spec.layers), spec.components, dtype=spec.dtype)
         except moderngl.Error as error:
             raise self._too_large(spec.name, spec.bytes_per_pixel, size) from error
-        self._check_memory(spec.name, spec.bytes_per_pixel, size)
+        try:
+            self._check_memory(spec.name, spec.bytes_per_pixel, size)
+        except RenderError:
+            texture.release()
+            raise
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         return texture
 

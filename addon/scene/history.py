@@ -46,6 +46,8 @@ def same_population(first: Scene, second: Scene) -> bool:
 
     Where and how large they are may differ, and so may all that only colours them.
     """
+    if first is second:
+        return True
     mine, theirs = _instances(first), _instances(second)
     if mine.keys() != theirs.keys() or not all(_same_ids(mine[key], theirs[key]) for key in mine):
         return False

@@ -14,6 +14,10 @@ class Moment:
     scene: Scene
     camera: Camera
 
+    def equals(self, other: "Moment") -> bool:
+        """Whether both are the same scene object seen in the very same way."""
+        return self.scene is other.scene and self.camera.sees_as(other.camera)
+
 
 @dataclass(frozen=True)
 class Sequence:

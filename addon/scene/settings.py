@@ -62,7 +62,7 @@ class Variant(StrEnum):
 class Layering(StrEnum):
     """How one pass over the geometry reaches several layers.
 
-    FASTEST: of the two that the driver has, the one that was faster when first used.
+    FASTEST: of those that round as separate passes do, the one that was faster when first used.
     GEOMETRY_SHADER: a geometry shader copies each triangle into every layer; vertices are transformed once.
     VERTEX_SHADER: one instance per layer, which the vertex shader sends there.
     """

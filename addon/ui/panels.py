@@ -8,7 +8,7 @@ from bl_ui.utils import PresetPanel
 
 from ..engine import passes, statistics
 from ..engine.settings import GuardBandUnit, SeparationUnit
-from ..scene import Variant
+from ..scene import DebugView, Variant
 from .operators import (
     LAYERS_PRESETS,
     SAMPLING_PRESETS,
@@ -99,6 +99,8 @@ class DEEP_GBUFFER_PT_layers(_EnginePanel, bpy.types.Panel):
         several.prop(settings, "separation_unit")
         relative = settings.separation_unit == SeparationUnit.RELATIVE
         several.prop(settings, "relative_separation" if relative else "minimum_separation", text="Minimum")
+        if settings.layers > 1 and not _reads_deeper_layers(settings):
+            column.label(text="Only layer output and debug views read them yet", icon="INFO")
 
 
 class DEEP_GBUFFER_PT_guard_band(_EnginePanel, bpy.types.Panel):
@@ -122,6 +124,12 @@ class DEEP_GBUFFER_PT_guard_band(_EnginePanel, bpy.types.Panel):
         column.prop(settings, "guard_band_unit")
         percent = settings.guard_band_unit == GuardBandUnit.PERCENT
         column.prop(settings, "guard_band_percent" if percent else "guard_band_pixels")
+
+
+def _reads_deeper_layers(settings: Any) -> bool:
+    """Whether anything that is switched on reads a layer behind the first."""
+    shown = settings.debug_view != DebugView.NONE and settings.debug_layer > 1
+    return settings.save_layers or settings.save_deep or shown
 
 
 def _reads_past_the_edge(settings: Any) -> bool:

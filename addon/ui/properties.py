@@ -12,6 +12,7 @@ from ..scene import DebugView, Variant
 from ..scene.settings import MAXIMUM_LAYERS
 
 _SCENE: Any = bpy.types.Scene  # takes properties that its type does not name
+# Files store an item's place in its list: new ones go to the end.
 DEBUG_ITEMS = [
     (DebugView.NONE.value, "Rendered", "The finished picture"),
     (DebugView.DEPTH.value, "Depth", "Distance from the camera plane"),
@@ -55,20 +56,23 @@ VARIANT_ITEMS = [
     (
         Variant.PREVIOUS.value,
         "Previous",
-        "Draw all layers at once, guided by the previous frame's depth at the same pixel. Cheap, and exact at rest; "
-        "around anything that moves, hidden layers miss surfaces or hold some that are too close",
+        "Draw all layers at once, guided by the previous frame's depth at the same pixel. Fast in viewports, and exact "
+        "at rest; around anything that moves, hidden layers miss surfaces or hold some that are too close. Final "
+        "renders evaluate the frame before for it and are no faster than with Prepass",
     ),
     (
         Variant.PREDICT.value,
         "Predict",
         "Draw all layers at once, guided by where the last two frames suggest that everything is now. Exact for "
-        "steady motion; sudden changes put errors into hidden layers for a frame",
+        "steady motion; sudden changes put errors into hidden layers for a frame. Final renders evaluate the two "
+        "frames before for it and are no faster than with Prepass",
     ),
     (
         Variant.REPROJECT.value,
         "Reproject",
         "Draw all layers at once, comparing each surface with the previous frame where it was then. Follows any "
-        "motion; small errors remain where surfaces come into view, and at the picture's edge without a guard band",
+        "motion; small errors remain where surfaces come into view, and at the picture's edge without a guard band. "
+        "Final renders evaluate the frame before for it and are no faster than with Prepass",
     ),
 ]
 SEPARATION_ITEMS = [
@@ -228,7 +232,8 @@ class DeepGBufferSettings(bpy.types.PropertyGroup):
     )
     save_motion: BoolProperty(
         name="Motion Vectors",
-        description="Add how many pixels each layer's surfaces moved since the previous frame",
+        description="Add how many pixels each layer's surfaces moved since the previous frame, which is evaluated for "
+        "it",
         default=False,
     )
     save_exit: BoolProperty(

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from addon.render import RenderError
+from addon.render import RenderError, ShaderError
 from addon.render.layering import Trial, resolved
 from addon.scene import Layering, RenderSettings, Variant
 
@@ -40,12 +40,21 @@ def choose(on, attempt, layering=Layering.FASTEST):
         (Trial(1.0, b"bits"), Trial(2.0, b"bits"), VERTEX),
         (Trial(2.0, b"bits"), Trial(1.0, b"other"), VERTEX),
         (Trial(1.0, b"other"), Trial(2.0, b"bits"), GEOMETRY),
-        (Trial(2.0, b"other"), Trial(1.0, b"others"), VERTEX),
+        (Trial(1.0, b"other"), Trial(2.0, b"others"), VERTEX),
     ],
 )
 def test_the_faster_of_those_that_round_as_separate_passes_is_taken(vertex, geometry, chosen):
     attempt, _ = attempts(vertex, geometry)
     assert choose(device(), attempt) is chosen
+
+
+def test_a_way_that_the_driver_cannot_compile_is_not_taken():
+    def attempt(settings):
+        if settings.layering is VERTEX and settings.variant is not Variant.TWO_PASS:
+            raise ShaderError("refused")
+        return Trial(9.0, b"bits")
+
+    assert choose(device(), attempt) is GEOMETRY
 
 
 def test_it_is_measured_once_and_remembered():

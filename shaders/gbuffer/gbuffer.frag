@@ -61,36 +61,46 @@ bool too_near(ivec2 pixel, float view_depth, float slope)
 // Pixels. Farther than this from where the oracle was sampled, a slope says little: off the picture, without guard band.
 const float LARGEST_OFFSET = 1.5;
 
-/** How much a view depth changes per pixel; in perspective its inverse is what is linear on the screen. */
-vec2 depth_change(float depth)
+#if defined(DRIFT) || defined(REPROJECT)
+/** Change of a view depth per pixel, x and y; in perspective its inverse is what is linear on the screen. */
+vec2 depth_gradient(float depth)
 {
     if (orthographic != 0)
-        return abs(vec2(dFdx(depth), dFdy(depth)));
-    float inverse = 1.0 / depth;
-    return abs(vec2(dFdx(inverse), dFdy(inverse))) * depth * depth;
+        return vec2(dFdx(depth), dFdy(depth));
+    float inverse_depth = 1.0 / depth;
+    return vec2(dFdx(inverse_depth), dFdy(inverse_depth)) * -(depth * depth);
 }
+#endif
 
 /** Whether this fragment is, by what the oracle knows. Derivatives: call where all fragments of a quad do. */
 bool too_near_previous_layer()
 {
-    vec2 offset = vec2(oracle_drift + oracle_snapping);
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     float view_depth = surface.view_depth;
+#if defined(DRIFT) || defined(REPROJECT)
+    vec2 gradient = depth_gradient(surface.view_depth);
+    vec2 offset = vec2(oracle_drift);
+#endif
 #ifdef REPROJECT
+    vec2 origin = gl_FragCoord.xy - motion_vector();
+    // From per pixel of now to per pixel of then: a surface may have been wider or narrower on the screen.
+    vec2 previous_gradient =
+        inverse(transpose(mat2(dFdx(origin), dFdy(origin)))) * depth_gradient(surface.previous.w);
     // Off the screen the nearest pixel of its edge is asked; behind the camera nothing was seen, and the same pixel
     // must do.
     if (surface.previous.w >= clip_start)
     {
-        vec2 origin = gl_FragCoord.xy - motion_vector();
         pixel = ivec2(clamp(origin, vec2(0.0), resolution - 0.5));
-        offset = min(abs(origin - (vec2(pixel) + 0.5)), LARGEST_OFFSET) + oracle_snapping;
+        offset = min(abs(origin - (vec2(pixel) + 0.5)), LARGEST_OFFSET);
         view_depth = surface.previous.w;
+        gradient = previous_gradient;
     }
-    vec2 change = depth_change(surface.previous.w);
-#else
-    vec2 change = depth_change(surface.view_depth);
 #endif
-    return too_near(pixel, view_depth, dot(change, offset));
+#if defined(DRIFT) || defined(REPROJECT)
+    return too_near(pixel, view_depth, dot(abs(gradient), offset + oracle_snapping));
+#else
+    return too_near(pixel, view_depth, 0.0);
+#endif
 }
 #endif
 

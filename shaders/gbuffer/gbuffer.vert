@@ -4,10 +4,10 @@
 #ifdef VERTEX_LAYER
 #if defined(GL_ARB_shader_viewport_layer_array)
 #extension GL_ARB_shader_viewport_layer_array : require
-#elif defined(GL_NV_viewport_array2)
-#extension GL_NV_viewport_array2 : require
-#else
+#elif defined(GL_AMD_vertex_shader_layer)
 #extension GL_AMD_vertex_shader_layer : require
+#else
+#extension GL_NV_viewport_array2 : require
 #endif
 #endif
 
@@ -29,11 +29,11 @@ in vec3 in_translation_low; // what float32 loses of the fourth column
 #ifdef WRITE_OBJECT_INDEX
 in int in_object_index;
 #endif
-#ifdef PREVIOUS
+#ifdef PREVIOUS_POSE
 in vec3 in_previous_position;
 uniform sampler2D previous_poses;
 #endif
-#ifdef LOOK_AHEAD
+#ifdef NEXT_POSE
 in vec3 in_next_position;
 uniform sampler2D next_poses;
 #endif
@@ -62,7 +62,7 @@ struct Pose
     vec3 translation_low;
 };
 
-#if defined(PREVIOUS) || defined(LOOK_AHEAD)
+#if defined(PREVIOUS_POSE) || defined(NEXT_POSE)
 /** The pose of an instance from a texture with four texels each (`geometry.PoseTexture`). */
 Pose fetch_pose(sampler2D poses, int instance)
 {
@@ -98,17 +98,30 @@ void main()
     int layer = 0;
 #endif
 #ifdef PREVIOUS
+#ifdef PREVIOUS_POSE
+    Pose previous_pose = fetch_pose(previous_poses, instance);
+    vec3 previous_position = in_previous_position;
+#else
+    Pose previous_pose = pose;
+    vec3 previous_position = in_position;
+#endif
     // The very same steps as above: where nothing moved, the results are equal to the last bit.
-    vec3 previous_relative = relative_to(previous_camera_high.xyz, previous_camera_low.xyz,
-                                         fetch_pose(previous_poses, instance), in_previous_position);
+    vec3 previous_relative =
+        relative_to(previous_camera_high.xyz, previous_camera_low.xyz, previous_pose, previous_position);
     precise vec4 previous_clip = previous_clip_from_relative * vec4(previous_relative, 1.0);
     precise float previous_view_depth = dot(previous_forward.xyz, previous_relative);
     surface.clip = clip.xyw;
     surface.previous = vec4(previous_clip.xyw, previous_view_depth);
 #endif
 #ifdef LOOK_AHEAD
-    vec3 next_relative = relative_to(next_camera_high.xyz, next_camera_low.xyz, fetch_pose(next_poses, instance),
-                                     in_next_position);
+#ifdef NEXT_POSE
+    Pose next_pose = fetch_pose(next_poses, instance);
+    vec3 next_position = in_next_position;
+#else
+    Pose next_pose = pose;
+    vec3 next_position = in_position;
+#endif
+    vec3 next_relative = relative_to(next_camera_high.xyz, next_camera_low.xyz, next_pose, next_position);
     precise vec4 next_clip = next_clip_from_relative * vec4(next_relative, 1.0);
     precise float next_view_depth = dot(next_forward.xyz, next_relative);
 #ifdef GEOMETRY_LAYERS

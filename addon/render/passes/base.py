@@ -7,6 +7,7 @@ from typing import Protocol
 
 from ...scene import Camera, Layering, Moment, RenderSettings, Scene
 from ...scene.correspondence import Correspondence
+from ...scene.drift import pixel_drift
 from ..device import Device
 from ..draws import DrawLists
 from ..film import Film
@@ -25,10 +26,10 @@ class Frame:
     """One view's state during one sample.
 
     Cameras include the guard band. `view`: the scene's own; `camera`: the same with the sample's sub-pixel jitter.
-    `layering`: how one pass over the geometry reaches several layers. `oracle`: what its texture shows.
+    `layering`: how one pass over the geometry reaches several layers. `oracle`: what its textures show.
     `previous`: the frame before. `history`: what a final render draws its oracle from, if not from the frame itself.
     `ahead`: the next picture as far as it is known or predicted, None where that is the next sample.
-    `continuous`: as in `Sequence`.
+    `continuous`: as in `Sequence`. `drift`: what `drift_since` found.
     """
 
     device: Device
@@ -50,6 +51,7 @@ class Frame:
     history: Moment | None
     ahead: Moment | None
     continuous: bool
+    drift: float | None = None
 
     @property
     def moment(self) -> Moment:
@@ -61,6 +63,14 @@ class Frame:
         width, height = self.pool.size
         x, y = sample.pixel_offset
         return camera.shifted(x / width, y / height)
+
+    def drift_since(self, oracle: Moment, moment: Moment) -> float:
+        """A bound on the pixels that surfaces moved between two moments; found once, for jitter moves both alike."""
+        if oracle.equals(moment):
+            return 0.0
+        if self.drift is None:
+            self.drift = pixel_drift(oracle, moment, *self.pool.size)
+        return self.drift
 
     def begin_sample(self, sample: Sample) -> None:
         """Go on to a sample."""

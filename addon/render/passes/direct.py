@@ -6,8 +6,9 @@ from collections.abc import Iterator
 import moderngl
 
 from ..device import Device
+from ..direct_needs import DIRECT_DEFINES
 from ..light_table import LIGHTS_PER_ROW, TEXELS_PER_LIGHT, light_table
-from ..plan import DIRECT_DEFINES, PlannedPass
+from ..plan import PlannedPass
 from ..programs import ProgramSpec
 from ..uniforms import UniformBlock
 from .base import Frame, subsets

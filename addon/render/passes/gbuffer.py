@@ -4,7 +4,6 @@
 from collections.abc import Iterator
 
 from ...scene import Moment, Variant
-from ...scene.drift import pixel_drift
 from ...scene.history import same_population
 from ..device import Device
 from ..plan import HISTORY_TARGET, ORACLE_TARGET, PlannedPass
@@ -65,23 +64,26 @@ class GBufferPass:
         plan, state = frame.plan, frame.oracle
         channels = tuple(channel for channel, _ in plan.channels)
         shown = state.shown.moment
-        exact = state.shows(state.source, frame.moment)
-        reprojects = plan.variant is Variant.REPROJECT and not exact
-        defines = {"ORACLE", *(("REPROJECT",) if reprojects else ()), *(("LOOK_AHEAD",) if plan.look_ahead else ())}
+        exact = state.is_exact(frame.moment)
         ahead = _look_ahead(frame) if plan.look_ahead else None
+        defines = {"ORACLE"}
+        if not exact:
+            defines.add("REPROJECT" if plan.variant is Variant.REPROJECT else "DRIFT")
+        if ahead is not None:
+            defines.add("LOOK_AHEAD")
         view = GeometryView(
             frame.moment,
-            GeometryProgram(channels, frozenset(defines), plan.drawn_layers, frame.layering),
+            GeometryProgram(channels, frozenset(defines), plan.layers + (ahead is not None), frame.layering),
             targets=tuple(channel.target_name for channel in channels),
             oracle=frame.pool.texture(state.source),
-            oracle_drift=0.0 if exact else pixel_drift(shown, frame.moment, *frame.pool.size),
+            oracle_drift=frame.drift_since(shown, frame.moment),
             previous=_previous(frame),
             following=ahead,
         )
         self._rasterizer.draw(frame, view)
-        self._leave(frame, ahead)
+        self._leave(frame, ahead, exact=exact)
 
-    def _leave(self, frame: Frame, ahead: Moment | None) -> None:
+    def _leave(self, frame: Frame, ahead: Moment | None, *, exact: bool) -> None:
         """Keep what the next picture's layers may be tested against: the next sample's, or the next view's.
 
         Of a view its first sample is kept, which goes through pixel centres as the next view's first does.
@@ -96,7 +98,7 @@ class GBufferPass:
         elif first and frame.continuous and plan.variant in (Variant.PREVIOUS, Variant.REPROJECT):
             for layer in range(plan.layers - 1):
                 frame.pool.copy("gbuffer.view_depth", layer, HISTORY_TARGET, layer)
-            state.show(HISTORY_TARGET, frame.moment, plan.layers - 1)
+            state.show(HISTORY_TARGET, frame.moment, plan.layers - 1, plan.layers - 1 if exact else 1)
 
 
 def _previous(frame: Frame) -> Moment:
@@ -111,11 +113,13 @@ def _following(frame: Frame) -> Moment | None:
     return None if frame.plan.variant is Variant.PREDICT and frame.sample.index > 0 else frame.ahead
 
 
-def _look_ahead(frame: Frame) -> Moment:
-    """The next picture: the next frame's first sample where that is known, this frame's next sample otherwise."""
+def _look_ahead(frame: Frame) -> Moment | None:
+    """The next picture: the next frame's first sample where that is known, else this frame's next sample if any."""
     following = _following(frame)
     if following is not None:
         first = film_sample(0, frame.settings.filter_radius, frame.settings.seed)
         return Moment(following.scene, frame.jittered(following.camera, first))
+    if frame.sample.index + 1 == frame.settings.samples:
+        return None
     after = film_sample(frame.sample.index + 1, frame.settings.filter_radius, frame.settings.seed)
     return Moment(frame.scene, frame.jittered(frame.view, after))

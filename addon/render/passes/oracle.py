@@ -7,7 +7,7 @@ What an earlier picture left is used where the variant says so; the rest is peel
 from collections.abc import Iterator
 
 from ...scene import Moment, Variant
-from ...scene.history import is_cut
+from ...scene.history import is_cut, same_population
 from ..device import Device
 from ..layout import CHANNELS
 from ..plan import HISTORY_TARGET, ORACLE_SCRATCH, ORACLE_TARGET, PlannedPass
@@ -36,19 +36,24 @@ class OraclePass:
 
     def run(self, frame: Frame, planned: PlannedPass) -> None:
         """Peel the layers that are not known yet."""
-        state = frame.oracle
-        moment = frame.moment
+        state, moment = frame.oracle, frame.moment
         state.source = ORACLE_TARGET
-        if not state.shows(ORACLE_TARGET, moment):
-            if state.shows(HISTORY_TARGET, moment) or _carries(frame):
-                state.source = HISTORY_TARGET
-            else:
-                if frame.history is not None:
-                    moment = Moment(frame.history.scene, frame.jittered(frame.history.camera, frame.sample))
-                state.show(ORACLE_TARGET, moment, 0)
-        for layer in range(state.shown.layers, frame.plan.layers - 1):
+        known = 0
+        if state.shows(ORACLE_TARGET, moment):
+            known = state.shown.exact
+        elif state.shows(HISTORY_TARGET, moment):
+            state.source = HISTORY_TARGET
+            known = state.shown.exact
+        elif _carries(frame):
+            state.source = HISTORY_TARGET
+            known = state.shown.layers
+        else:
+            if frame.history is not None:
+                moment = Moment(frame.history.scene, frame.jittered(frame.history.camera, frame.sample))
+            state.show(ORACLE_TARGET, moment, 0)
+        for layer in range(known, frame.plan.layers - 1):
             self._peel(frame, moment, layer)
-        state.complete(frame.plan.layers - 1)
+        state.complete(frame.plan.layers - 1, exact=state.shown.moment.equals(moment))
 
     def release(self) -> None:
         """Free the pass's uniforms."""
@@ -58,13 +63,16 @@ class OraclePass:
         """Draw one layer of the oracle, depth only."""
         source = frame.oracle.source
         target = ORACLE_SCRATCH if layer > 0 else source
+        drift = frame.drift_since(frame.oracle.shown.moment, moment) if layer > 0 else 0.0
+        defines = {*(("ORACLE",) if layer > 0 else ()), *(("DRIFT",) if drift > 0.0 else ())}
         view = GeometryView(
             moment,
-            GeometryProgram(_VIEW_DEPTH, frozenset({"ORACLE"} if layer > 0 else ()), layering=frame.layering),
+            GeometryProgram(_VIEW_DEPTH, frozenset(defines), layering=frame.layering),
             targets=(target,),
             into=0,
             first_layer=layer,
             oracle=frame.pool.texture(source) if layer > 0 else None,
+            oracle_drift=drift,
         )
         self._rasterizer.draw(frame, view)
         if layer > 0:
@@ -76,12 +84,10 @@ def _carries(frame: Frame) -> bool:
     left, previous = frame.oracle.history, frame.previous
     if left is None or previous is None or not frame.continuous or frame.sample.index > 0:
         return False
-    if not _has_moved(Moment(frame.scene, frame.view), previous) or is_cut(previous, frame.moment):
+    if previous.equals(Moment(frame.scene, frame.view)) or is_cut(previous, frame.moment):
+        return False
+    if not same_population(previous.scene, frame.scene):
         return False
     if frame.plan.variant is Variant.PREDICT:
         return True
-    return frame.plan.variant in (Variant.PREVIOUS, Variant.REPROJECT) and not _has_moved(left, previous)
-
-
-def _has_moved(now: Moment, before: Moment) -> bool:
-    return now.scene is not before.scene or not now.camera.sees_as(before.camera)
+    return frame.plan.variant in (Variant.PREVIOUS, Variant.REPROJECT) and left.equals(previous)

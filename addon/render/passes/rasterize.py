@@ -2,7 +2,7 @@
 """What passes that rasterise geometry share: their program variants, their uniforms and the drawing itself."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from math import log2
 
@@ -62,9 +62,11 @@ _FRAME_BINDING, _MATERIAL_BINDING = 0, 1
 class GeometryProgram:
     """How a pass draws geometry, whatever the material.
 
-    `channels` it writes. `defines`: ORACLE (discard what is too near the layer before), REPROJECT (by where it was in
-    the previous frame), EXIT (keep back faces behind the finished layers), LOOK_AHEAD (the last layer shows the next
-    picture). `layers` that one pass reaches, the way `layering` says.
+    `channels` it writes. `layers` that one pass reaches, the way `layering` says. `defines`:
+    ORACLE: discard what is too near the layer before; DRIFT: allow for what moved since the oracle was drawn;
+    REPROJECT: judge a fragment by where it was in the previous frame. EXIT: keep back faces behind the finished layers.
+    LOOK_AHEAD: the last layer shows the next picture. PREVIOUS_POSE, NEXT_POSE: instances or vertices may be elsewhere
+    in that frame, not the camera alone.
     """
 
     channels: tuple[GBufferChannel, ...]
@@ -161,8 +163,13 @@ class Rasterizer:
 
     def _draw_all(self, frame: Frame, view: GeometryView, scene_draws: SceneDraws) -> None:
         program = view.program
-        previous = frame.correspondence(view.previous.scene) if view.previous and program.reads_previous else None
-        following = frame.correspondence(view.following.scene) if view.following else None
+        previous = following = None
+        if view.previous and program.reads_previous and view.previous.scene is not view.moment.scene:
+            previous = frame.correspondence(view.previous.scene)
+        if view.following and view.following.scene is not view.moment.scene:
+            following = frame.correspondence(view.following.scene)
+        poses = {*(("PREVIOUS_POSE",) if previous else ()), *(("NEXT_POSE",) if following else ())}
+        program = replace(program, defines=program.defines | poses)
         times = OtherTimes(previous, following)
         surfaces = {draw.surface for draw in scene_draws.draws}
         programs = {surface: self._device.programs.get(program.spec(surface, self._depth)) for surface in surfaces}
@@ -237,18 +244,20 @@ def geometry_variants() -> Iterator[ProgramSpec]:
     bounds a loop of the geometry shader: the fewest and the most stand for all.
     """
     depths = (frozenset[str](), frozenset({FRAGMENT_DEPTH}))
+    tests = ((), ("ORACLE",), ("ORACLE", "DRIFT"), ("ORACLE", "REPROJECT"))
     view_depth, *optional = CHANNELS
     for channels in subsets(channel.name for channel in optional):
         written = (view_depth, *(channel for channel in optional if channel.name in channels))
-        for test, surface, depth in product(((), ("ORACLE",), ("ORACLE", "REPROJECT")), SURFACES, depths):
+        for test, surface, depth in product(tests, SURFACES, depths):
             yield GeometryProgram(written, frozenset(test)).spec(surface, depth)
     for surface, depth in product(SURFACES, depths):
         yield GeometryProgram(EXIT_CHANNELS, frozenset({"EXIT"})).spec(surface, depth)
     by_vertex = [channel for channel in optional if channel.name in ("normal", "object_index", "motion")]
-    tests = (frozenset[str](), frozenset({"LOOK_AHEAD"}), frozenset({"EXIT"}))
+    poses = subsets(("PREVIOUS_POSE", "NEXT_POSE"))
+    vertices = [frozenset({"EXIT"}), *poses, *(frozenset({"LOOK_AHEAD"}) | pose for pose in poses)]
     ways = ((2, Layering.VERTEX_SHADER), *((layers, Layering.GEOMETRY_SHADER) for layers in (1, 2, 9)))
     for names, defines, surface, (layers, layering) in product(
-        subsets(channel.name for channel in by_vertex), tests, SURFACES, ways
+        subsets(channel.name for channel in by_vertex), vertices, SURFACES, ways
     ):
         written = (view_depth, *(channel for channel in by_vertex if channel.name in names))
         yield GeometryProgram(written, defines, layers, layering).spec(surface, frozenset())
