@@ -3,6 +3,7 @@
 
 import json
 import os
+import platform
 import subprocess
 import sys
 import time
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 REPOSITORY = Path(__file__).resolve().parents[2]
+SHARED = REPOSITORY.parent / "shared" / "scenes"
 RESULTS = Path(__file__).resolve().parent / "results"
 RESOLUTION = "640x360"
 SAMPLES = 16
@@ -34,6 +36,27 @@ def render(blend: Path, engine: str, scratch: Path, shader_cache: Path, *, repea
     start = time.perf_counter()
     subprocess.run([*command, "--stats", str(statistics)], env=surroundings, check=True)
     return Run(time.perf_counter() - start, json.loads(statistics.read_text(encoding="utf-8")))
+
+
+def snapshots(blend: Path, frames: Sequence[int], resolution: tuple[int, int], scratch: Path) -> list[Path]:
+    """Snapshots of consecutive frames of a .blend, written into the folder `scratch`, in order."""
+    command = [sys.executable, str(REPOSITORY / "build.py"), "render", str(blend), "-o", str(scratch / blend.stem)]
+    command[-1] += ".png"
+    command += ["--resolution", "{}x{}".format(*resolution), "--samples", "1", "--set", "save_snapshot=True"]
+    command += ["--frames", f"{frames[0]}-{frames[-1]}"]
+    subprocess.run(command, env={**os.environ, "LIBGL_ALWAYS_SOFTWARE": "1"}, check=True, stdout=subprocess.DEVNULL)
+    return sorted(scratch.glob(f"{blend.stem}_*_snapshot.npz"))
+
+
+def machine() -> str:
+    """The processor's model, the cores this process may use, and the operating system."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    model = platform.processor()
+    described = Path("/proc/cpuinfo")
+    if described.is_file():
+        lines = (line.partition(":") for line in described.read_text(encoding="utf-8").splitlines())
+        model = next((value.strip() for key, _, value in lines if key.strip() == "model name"), model)
+    return f"{model or platform.machine()}, {cores} cores, {platform.system()}"
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

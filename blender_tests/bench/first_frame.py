@@ -1,31 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From nothing to a picture: Cornell at 640×360 with 16 samples, process start included, against EEVEE."""
 
-import os
-import platform
 import statistics
 import sys
 import tempfile
 from pathlib import Path
 
-from _runs import REPOSITORY, RESOLUTION, SAMPLES, render, report, table
+from blender_tests.bench._runs import REPOSITORY, RESOLUTION, SAMPLES, machine, render, report, table
 
 SCENE = REPOSITORY / "scenes" / "cornell_box.blend"
 ENGINES = ("DEEP_GBUFFER", "EEVEE")
 STATES = ("empty", "filled by the run before")
 ROUNDS = 3
 TARGET = 5.0
-
-
-def machine() -> str:
-    """The processor's model, the cores this process may use, and the operating system."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    model = platform.processor()
-    described = Path("/proc/cpuinfo")
-    if described.is_file():
-        lines = (line.partition(":") for line in described.read_text(encoding="utf-8").splitlines())
-        model = next((value.strip() for key, _, value in lines if key.strip() == "model name"), model)
-    return f"{model or platform.machine()}, {cores} cores, {platform.system()}"
 
 
 def main(arguments: list[str]) -> int:

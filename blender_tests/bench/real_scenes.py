@@ -6,9 +6,8 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from _runs import REPOSITORY, RESOLUTION, SAMPLES, render, report, table
+from blender_tests.bench._runs import REPOSITORY, RESOLUTION, SAMPLES, SHARED, render, report, table
 
-SHARED = REPOSITORY.parent / "shared" / "scenes"
 SCENES = (
     SHARED / "sponza" / "sponza.blend",
     SHARED / "living_room" / "living_room.blend",

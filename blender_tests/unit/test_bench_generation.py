@@ -177,11 +177,16 @@ def test_only_delay_looks_ahead():
     camera = builders.camera()
     moments = tuple(Moment(builders.scene(builders.quad("a")), camera) for _ in range(4))
     clip = _clips.Clip("clip", "", moments)
-    delayed, reprojected = (_measuring.sequence(clip, 2, variant) for variant in (Variant.DELAY, Variant.REPROJECT))
+    delayed, reprojected = (_measuring.sequence(clip, 2, 0, variant) for variant in (Variant.DELAY, Variant.REPROJECT))
     assert (delayed.earlier, delayed.previous, delayed.following) == (moments[0], moments[1], moments[3])
     assert (reprojected.earlier, reprojected.previous, reprojected.following) == (moments[0], moments[1], None)
-    first = _measuring.sequence(clip, 0, Variant.PREDICT)
-    assert (first.earlier, first.previous) == (None, None)
+
+
+@pytest.mark.parametrize(("index", "known"), [(1, (None, None)), (2, (None, 1)), (3, (1, 2))])
+def test_a_viewport_knows_no_frame_before_its_first(index, known):
+    moments = tuple(Moment(builders.scene(builders.quad("a")), builders.camera()) for _ in range(4))
+    seen = _measuring.sequence(_clips.Clip("clip", "", moments), index, 1, Variant.PREDICT)
+    assert (seen.earlier, seen.previous) == tuple(None if frame is None else moments[frame] for frame in known)
 
 
 def figures(stage, occlusion=0.0, differing=0.0):
@@ -217,7 +222,7 @@ def test_the_table_of_a_sequence_has_times_relative_to_one_layer_per_separation(
     ]
 
 
-def test_the_verdict_names_what_is_dearer_at_two_layers():
+def test_the_verdict_counts_what_is_dearer_at_two_layers():
     def row(layers, method, *ratios):
         return _generation_tables.LayeringRow("hall", layers, method, 100.0, ratios)
 
@@ -227,5 +232,6 @@ def test_the_verdict_names_what_is_dearer_at_two_layers():
         row(2, Layering.VERTEX_SHADER, 0.9, 0.9, 0.9, 0.9),
     ]
     dearer = _generation_tables.verdict(Layering.GEOMETRY_SHADER, rows)
-    assert "no, not Delay in hall (1.20)." in dearer
-    assert "yes, everywhere" in _generation_tables.verdict(Layering.VERTEX_SHADER, rows)
+    assert dearer.startswith("- By geometry shader, ")
+    assert "no, more in 1 of 4 cases (0.90 to 1.20 times as much)" in dearer
+    assert "yes, always" in _generation_tables.verdict(Layering.VERTEX_SHADER, rows)

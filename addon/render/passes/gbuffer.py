@@ -91,10 +91,12 @@ class GBufferPass:
         plan, state = frame.plan, frame.oracle
         first = frame.sample.index == 0
         if ahead is not None:
+            target = HISTORY_TARGET if _following(frame) is not None else ORACLE_TARGET
             if same_population(frame.scene, ahead.scene):
-                target = HISTORY_TARGET if _following(frame) is not None else ORACLE_TARGET
                 frame.pool.copy("gbuffer.view_depth", plan.layers, target, 0)
                 state.show(target, ahead, 1)
+            else:
+                state.targets.pop(target, None)
         elif first and frame.continuous and plan.variant in (Variant.PREVIOUS, Variant.REPROJECT):
             for layer in range(plan.layers - 1):
                 frame.pool.copy("gbuffer.view_depth", layer, HISTORY_TARGET, layer)
