@@ -39,7 +39,7 @@ class Layout:
     def grayed_out(self):
         return not self.active or (self.parent is not None and self.parent.grayed_out)
 
-    def label(self, text):
+    def label(self, text, **_options):
         self.texts.append(text)
 
     def prop(self, data, name, **_options):
@@ -89,6 +89,24 @@ def test_what_only_concerns_several_layers_is_gray_with_one(plane_scene):
     assert not drawn(DEEP_GBUFFER_PT_layers).gray
     plane_scene.deep_gbuffer.layers = 1
     assert drawn(DEEP_GBUFFER_PT_layers).gray == {"variant", "separation_unit", "minimum_separation"}
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({}, True),
+        ({"layers": 1}, False),
+        ({"save_layers": True}, False),
+        ({"save_deep": True}, False),
+        ({"debug_view": "NORMAL", "debug_layer": 2}, False),
+        ({"debug_view": "NORMAL", "debug_layer": 1}, True),
+        ({"debug_layer": 2}, True),
+    ],
+)
+def test_who_sets_layers_is_told_where_nothing_reads_them(plane_scene, change, told):
+    for name, value in change.items():
+        setattr(plane_scene.deep_gbuffer, name, value)
+    assert any("read them" in text for text in drawn(DEEP_GBUFFER_PT_layers).texts) == told
 
 
 @pytest.mark.parametrize(
