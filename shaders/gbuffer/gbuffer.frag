@@ -114,10 +114,9 @@ bool is_exit()
 #endif
 
 #ifdef WRITE_NORMAL
-/** Unit world-space shading normal on the viewer's side of the triangle. */
-vec3 facing_normal()
+/** Unit world-space shading normal on the viewer's side of a triangle, whose own normal is `geometric`. */
+vec3 facing_normal(vec3 geometric)
 {
-    vec3 geometric = image_handedness * cross(dFdx(surface.position), dFdy(surface.position));
     float squared = dot(surface.normal, surface.normal);
     if (squared > 0.0)
         return surface.normal * (is_front() ? 1.0 : -1.0) * inversesqrt(squared);
@@ -137,23 +136,21 @@ float reversed_depth()
 
 void main()
 {
-    // Derivatives are taken before any fragment of a quad is discarded.
-#ifdef ORACLE
-    bool hidden = too_near_previous_layer();
-#endif
+    // Derivatives are taken before any fragment of a quad is discarded; what needs none can wait.
 #ifdef WRITE_NORMAL
-    vec3 normal = facing_normal();
+    vec3 geometric = image_handedness * cross(dFdx(surface.position), dFdy(surface.position));
 #endif
 #ifdef TEXTURE
-    vec4 texel = texture(base_color_texture, surface.uv, texture_lod_bias);
+    float lod = textureQueryLod(base_color_texture, surface.uv).y + texture_lod_bias;
+#endif
+#ifdef ORACLE
+    bool hidden = too_near_previous_layer();
+    if (hidden && surface.layer > 0 && surface.layer != look_ahead_layer)
+        discard;
 #endif
 #ifdef ALPHA_TEST
     // Level 0: averaging alpha would make distant foliage vanish.
     if (material_emission.a * textureLod(base_color_texture, surface.uv, 0.0).a < alpha_threshold)
-        discard;
-#endif
-#ifdef ORACLE
-    if (hidden && surface.layer > 0 && surface.layer != look_ahead_layer)
         discard;
 #endif
 #ifdef EXIT
@@ -165,12 +162,12 @@ void main()
 #endif
     out_view_depth = surface.view_depth;
 #ifdef WRITE_NORMAL
-    out_normal = encode_octahedral(normal);
+    out_normal = encode_octahedral(facing_normal(geometric));
 #endif
 #ifdef WRITE_BASE_COLOR
     vec3 base_color = material_base_color.rgb;
 #ifdef TEXTURE
-    base_color *= texel.rgb;
+    base_color *= textureLod(base_color_texture, surface.uv, lod).rgb;
 #endif
 #ifdef ATTRIBUTE
     base_color *= surface.color;
