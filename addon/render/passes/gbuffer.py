@@ -5,29 +5,22 @@ from collections.abc import Iterator
 
 from ...scene import Moment, Variant
 from ...scene.history import same_population
-from ..device import Device
 from ..plan import HISTORY_TARGET, ORACLE_TARGET, PlannedPass
 from ..programs import ProgramSpec
 from ..sampling import film_sample
 from .base import Frame
-from .rasterize import GeometryProgram, GeometryView, Rasterizer, geometry_variants
+from .rasterize import GeometryPass, GeometryProgram, GeometryView, geometry_variants
 
 
-class GBufferPass:
+class GBufferPass(GeometryPass):
     """Draws all layers; layer k discards what is not behind layer k − 1 by more than Δz, as its oracle knows it."""
 
     name = "gbuffer"
-
-    def __init__(self, device: Device) -> None:
-        self._rasterizer = Rasterizer(device)
 
     @classmethod
     def variants(cls) -> Iterator[ProgramSpec]:
         """Every program of the passes that rasterise geometry."""
         yield from geometry_variants()
-
-    def prepare(self, frame: Frame, planned: PlannedPass) -> None:
-        """Nothing; draws and geometry are the view's."""
 
     def run(self, frame: Frame, planned: PlannedPass) -> None:
         """Draw all layers, and leave behind what the next picture's oracle needs."""
@@ -35,10 +28,6 @@ class GBufferPass:
             self._draw_at_once(frame)
         else:
             self._draw_in_turn(frame)
-
-    def release(self) -> None:
-        """Free the pass's uniforms."""
-        self._rasterizer.release()
 
     def _draw_in_turn(self, frame: Frame) -> None:
         """Two-pass generation: each layer is the oracle of the next."""

@@ -4,35 +4,20 @@
 What an earlier picture left is used where the variant says so; the rest is peeled here, depth only.
 """
 
-from collections.abc import Iterator
-
 from ...scene import Moment, Variant
 from ...scene.history import is_cut, same_population
-from ..device import Device
 from ..layout import CHANNELS
 from ..plan import HISTORY_TARGET, ORACLE_SCRATCH, ORACLE_TARGET, PlannedPass
-from ..programs import ProgramSpec
 from .base import Frame
-from .rasterize import GeometryProgram, GeometryView, Rasterizer
+from .rasterize import GeometryPass, GeometryProgram, GeometryView
 
 _VIEW_DEPTH = tuple(channel for channel in CHANNELS if channel.name == "view_depth")
 
 
-class OraclePass:
+class OraclePass(GeometryPass):
     """Completes the oracle for the sample that is about to be drawn."""
 
     name = "oracle"
-
-    def __init__(self, device: Device) -> None:
-        self._rasterizer = Rasterizer(device)
-
-    @classmethod
-    def variants(cls) -> Iterator[ProgramSpec]:
-        """None of its own: its programs are among the G-buffer's."""
-        yield from ()
-
-    def prepare(self, frame: Frame, planned: PlannedPass) -> None:
-        """Nothing; draws and geometry are the view's."""
 
     def run(self, frame: Frame, planned: PlannedPass) -> None:
         """Peel the layers that are not known yet."""
@@ -54,10 +39,6 @@ class OraclePass:
         for layer in range(known, frame.plan.layers - 1):
             self._peel(frame, moment, layer)
         state.complete(frame.plan.layers - 1, exact=state.shown.moment.equals(moment))
-
-    def release(self) -> None:
-        """Free the pass's uniforms."""
-        self._rasterizer.release()
 
     def _peel(self, frame: Frame, moment: Moment, layer: int) -> None:
         """Draw one layer of the oracle, depth only."""

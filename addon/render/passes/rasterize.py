@@ -15,6 +15,7 @@ from ..device import Device
 from ..draws import MATERIAL_UNIFORMS, SceneDraws
 from ..geometry import OtherTimes, split_float64
 from ..layout import CHANNELS, EXIT_CHANNELS, GBufferChannel, outputs_glsl
+from ..plan import PlannedPass
 from ..programs import ProgramSpec
 from ..raw_gl import CLIP_DISTANCE0
 from ..uniforms import UniformBlock
@@ -231,6 +232,25 @@ class Rasterizer:
             "camera_low": (*low, 0.0),
         }
         return {f"{prefix}{name}": value for name, value in values.items()}
+
+
+class GeometryPass:
+    """What passes that rasterise geometry have in common: draws and buffers are the view's, nothing is prepared."""
+
+    def __init__(self, device: Device) -> None:
+        self._rasterizer = Rasterizer(device)
+
+    @classmethod
+    def variants(cls) -> Iterator[ProgramSpec]:
+        """Those of the G-buffer pass are everybody's."""
+        yield from ()
+
+    def prepare(self, frame: Frame, planned: PlannedPass) -> None:
+        """Nothing."""
+
+    def release(self) -> None:
+        """Free the pass's uniforms."""
+        self._rasterizer.release()
 
 
 SURFACES = tuple(frozenset(names) for names in ((), ("TEXTURE",), ("TEXTURE", "ALPHA_TEST"), ("ATTRIBUTE",)))
