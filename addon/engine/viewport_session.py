@@ -134,7 +134,7 @@ class ViewportSession:
         """Render this view from now on; where it is what is already shown, go on refining. Never waits."""
         with self._lock:
             view = self._view
-            if view is not None and view.scene is scene and view.settings == settings and view.camera.sees_as(camera):
+            if view is not None and view.settings == settings and view.moment.equals(Moment(scene, camera)):
                 return
             self._view = View(scene, camera, settings)
             self._error = None

@@ -194,8 +194,13 @@ def _plan_oracle(
     return (PlannedPass("oracle", writes=tuple(writes)),)
 
 
+def reads_past_the_edge(variant: Variant) -> bool:
+    """Whether a variant that builds several layers looks up what lies around the picture."""
+    return variant is Variant.REPROJECT
+
+
 def _plan_guard_band(settings: RenderSettings, variant: Variant, left_out: list[LeftOut]) -> int:
-    if settings.guard_band == 0 or variant is Variant.REPROJECT:
+    if settings.guard_band == 0 or reads_past_the_edge(variant):
         return settings.guard_band
     reason = "nothing reads beyond the picture's edge: no screen-space effect, no layers that are reprojected"
     left_out.append(LeftOut("guard band", reason))

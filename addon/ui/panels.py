@@ -8,6 +8,7 @@ from bl_ui.utils import PresetPanel
 
 from ..engine import passes, statistics
 from ..engine.settings import GuardBandUnit, SeparationUnit
+from ..render import reads_past_the_edge
 from ..scene import DebugView, Variant
 from .operators import (
     LAYERS_PRESETS,
@@ -134,7 +135,7 @@ def _reads_deeper_layers(settings: Any) -> bool:
 
 def _reads_past_the_edge(settings: Any) -> bool:
     """Whether anything that is switched on reads the guard band."""
-    return settings.layers > 1 and settings.variant == Variant.REPROJECT
+    return settings.layers > 1 and reads_past_the_edge(Variant(settings.variant))
 
 
 class DEEP_GBUFFER_PT_film(_EnginePanel, bpy.types.Panel):

@@ -79,7 +79,7 @@ magnitudes = st.one_of(
 )
 
 
-def check(round_trip, colors):
+def assert_right_to_11_digits(round_trip, colors):
     """Each component is right to 11 binary digits of the largest, for GLSL's inverse and numpy's."""
     stored, decoded = round_trip(colors)
     # What is below the smallest normal number a driver may take for zero.
@@ -94,14 +94,16 @@ def check(round_trip, colors):
 @example(np.full((COLORS, 3), np.nextafter(np.float32(0), np.float32(1)), np.float32))
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_any_colors_are_right_to_11_binary_digits_of_the_largest_component(round_trip, colors):
-    check(round_trip, colors)
+    assert_right_to_11_digits(round_trip, colors)
 
 
 def test_every_exponent_is_right_to_11_binary_digits(round_trip):
     generator = np.random.default_rng(7)
     for first in range(-149, 96 - COLORS, COLORS):
         exponents = np.arange(first, first + COLORS)[:, None]
-        check(round_trip, np.ldexp(generator.uniform(0.0, 2.0, (COLORS, 3)), exponents).astype(np.float32))
+        assert_right_to_11_digits(
+            round_trip, np.ldexp(generator.uniform(0.0, 2.0, (COLORS, 3)), exponents).astype(np.float32)
+        )
 
 
 def test_black_is_stored_as_what_a_cleared_target_holds(round_trip):
