@@ -7,18 +7,22 @@ thread while `sync` builds the next one. What changed between two scenes is told
 
 from .camera import Camera
 from .geometry import InstanceBatch, Mesh, SlotRange
-from .lights import AreaShape, Light, LightKind
-from .materials import BaseColorSource, Extension, Image, ImageTexture, Interpolation, Material
-from .scene import Scene, Versions, World
+from .lights import ALL_GROUPS, LINK_GROUPS, AreaShape, Light, LightKind
+from .materials import BaseColorSource, EmissionSampling, Extension, Image, ImageTexture, Interpolation, Material
+from .scene import EnvironmentMap, Scene, Versions, World
 from .sequence import Moment, Sequence
-from .settings import Channel, DebugView, Layering, RenderSettings, Variant
+from .settings import Channel, DebugView, Layering, RenderSettings, ShadingModel, Variant
 
 __all__ = [
+    "ALL_GROUPS",
+    "LINK_GROUPS",
     "AreaShape",
     "BaseColorSource",
     "Camera",
     "Channel",
     "DebugView",
+    "EmissionSampling",
+    "EnvironmentMap",
     "Extension",
     "Image",
     "ImageTexture",
@@ -33,6 +37,7 @@ __all__ = [
     "RenderSettings",
     "Scene",
     "Sequence",
+    "ShadingModel",
     "SlotRange",
     "Variant",
     "Versions",

@@ -62,6 +62,8 @@ class InstanceBatch:
     `ids` (N,) int64: which instance each row is, the same from frame to frame whatever other rows come or go;
     rows of two frames with equal `mesh` and id show the same thing at two times.
     `version` differs whenever any array differs from that of an earlier batch with the same `key`.
+    `seen_by_camera`, `casts_shadow`: whether the instances are in the picture, and in front of lights.
+    `link_group` 0…63: which bit of a light's groups stands for them; 0 where nothing is linked.
     """
 
     key: str
@@ -71,6 +73,9 @@ class InstanceBatch:
     matrices: Float64Array
     object_index: Int32Array
     ids: Int64Array
+    seen_by_camera: bool = True
+    casts_shadow: bool = True
+    link_group: int = 0
 
     @property
     def count(self) -> int:

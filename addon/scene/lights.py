@@ -23,6 +23,12 @@ class AreaShape(StrEnum):
     ELLIPSE = "ELLIPSE"
 
 
+LINK_GROUPS = 64
+"""How many groups of instances light and shadow linking can tell apart, as in Cycles."""
+
+ALL_GROUPS = (1 << LINK_GROUPS) - 1
+
+
 @dataclass(frozen=True)
 class Light:
     """One light, emitting along its local −Z.
@@ -34,6 +40,11 @@ class Light:
     `angle` (rad): full cone angle of a spot, full angular diameter of a sun.
     `soft_falloff`: a point or spot light is a disk that always faces what it lights, not a sphere.
     `blend` 0…1: soft share of the spot's cone. `spread` (rad): full emission angle of an area light, π for all.
+    `diffuse_factor`, `specular_factor`: multiply the light that leaves surfaces so; 0 where rays of the kind miss it.
+    `receiver_groups`, `blocker_groups`: bit g is set where instances with `InstanceBatch.link_group` g are lit by it,
+    and where they cast its shadows (Blender's light and shadow linking).
+    `shadow_texel` (m): smallest useful size of a shadow-map texel on a surface 1 m away, or anywhere for a sun
+    (Blender's Resolution Limit), 0 for no limit.
     """
 
     key: str
@@ -51,3 +62,6 @@ class Light:
     diffuse_factor: float = 1.0
     specular_factor: float = 1.0
     casts_shadow: bool = True
+    receiver_groups: int = ALL_GROUPS
+    blocker_groups: int = ALL_GROUPS
+    shadow_texel: float = 0.0

@@ -56,6 +56,16 @@ class ImageTexture:
     interpolation: Interpolation = Interpolation.LINEAR
 
 
+class EmissionSampling(StrEnum):
+    """Which emissive surfaces are sampled as lights, as Cycles names it: what is worth it, no face, or which faces."""
+
+    AUTO = "AUTO"
+    NONE = "NONE"
+    FRONT = "FRONT"
+    BACK = "BACK"
+    FRONT_BACK = "FRONT_BACK"
+
+
 @dataclass(frozen=True)
 class Material:
     """Constants of Blender's Principled BSDF plus one base-colour texture.
@@ -65,7 +75,8 @@ class Material:
     drawn.
     `metallic`, `roughness` 0…1 (perceptual roughness; GGX α = roughness²).
     `specular` 0…1: dielectric reflectance at normal incidence (F0), 0 for purely diffuse surfaces.
-    `emission` scene-linear RGB radiance.
+    `emission` scene-linear RGB radiance, of both sides; `emission_sampling`: whether it is sampled as a light.
+    `diffuse_roughness` 0…1: of the diffuse reflection, 0 for Lambert (Oren–Nayar's, as Cycles means it).
     """
 
     key: str
@@ -80,6 +91,8 @@ class Material:
     roughness: float = 0.5
     specular: float = 0.04
     emission: Color = (0.0, 0.0, 0.0)
+    emission_sampling: EmissionSampling = EmissionSampling.AUTO
+    diffuse_roughness: float = 0.0
 
     @property
     def is_emissive(self) -> bool:

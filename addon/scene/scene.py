@@ -4,7 +4,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from .arrays import Color
+from .arrays import Color, Float32Array, Float64Array
 from .camera import Camera
 from .geometry import InstanceBatch, Mesh
 from .lights import Light
@@ -12,10 +12,40 @@ from .materials import Image, Material
 
 
 @dataclass(frozen=True)
+class EnvironmentMap:
+    """Radiance by direction.
+
+    `pixels` (H, W, 3) float32 ≥ 0 and finite, scene-linear RGB, equirectangular: texel (row, column) is about the
+    direction with elevation ((row + ½)/H − ½)·π above the XY plane and azimuth (½ − (column + ½)/W)·2π from +X
+    towards +Y, as Blender's Environment Texture lays it out.
+    """
+
+    key: str
+    name: str
+    version: int
+    pixels: Float32Array
+
+
+@dataclass(frozen=True)
 class World:
-    """Constant radiance that arrives from every direction, scene-linear RGB, W/(sr·m²)."""
+    """Radiance that arrives from infinitely far away, scene-linear RGB, W/(sr·m²).
+
+    `radiance`: of every direction, or the factor on `environment`, which is asked for the direction
+    `environment_from_world` (3, 3), a rotation, times the one in world space; None for no rotation.
+    `seen_by_camera`, `seen_by_diffuse`, `seen_by_glossy`: who sees it.
+    """
 
     radiance: Color = (0.0, 0.0, 0.0)
+    environment: EnvironmentMap | None = None
+    environment_from_world: Float64Array | None = None
+    seen_by_camera: bool = True
+    seen_by_diffuse: bool = True
+    seen_by_glossy: bool = True
+
+    @property
+    def shines(self) -> bool:
+        """Whether any surface can receive light from it."""
+        return max(self.radiance) > 0.0 and (self.seen_by_diffuse or self.seen_by_glossy)
 
 
 @dataclass(frozen=True)

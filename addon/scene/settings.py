@@ -10,7 +10,9 @@ class Channel(StrEnum):
 
     COMBINED: RGBA premultiplied radiance, mean over samples. DEPTH: view depth (m) of sample 0, 1e10 where empty.
     NORMAL: world-space shading normal, mean. POSITION: world-space position (m), sample 0.
-    DIFFUSE_COLOR: diffuse albedo, mean. OBJECT_INDEX: pass index of sample 0.
+    DIFFUSE_COLOR, GLOSSY_COLOR: diffuse and specular albedo, mean. OBJECT_INDEX: pass index of sample 0.
+    DIFFUSE_DIRECT, GLOSSY_DIRECT: radiance that lamps and world cause by either reflection, mean; Blender's passes are
+    these over the colours. EMISSION: radiance that surfaces emit, mean. ENVIRONMENT: the world seen directly, mean.
     """
 
     COMBINED = "COMBINED"
@@ -19,6 +21,11 @@ class Channel(StrEnum):
     POSITION = "POSITION"
     DIFFUSE_COLOR = "DIFFUSE_COLOR"
     OBJECT_INDEX = "OBJECT_INDEX"
+    GLOSSY_COLOR = "GLOSSY_COLOR"
+    DIFFUSE_DIRECT = "DIFFUSE_DIRECT"
+    GLOSSY_DIRECT = "GLOSSY_DIRECT"
+    EMISSION = "EMISSION"
+    ENVIRONMENT = "ENVIRONMENT"
 
 
 class DebugView(StrEnum):
@@ -72,6 +79,18 @@ class Layering(StrEnum):
     VERTEX_SHADER = "VERTEX_SHADER"
 
 
+class ShadingModel(StrEnum):
+    """How surfaces reflect direct light.
+
+    PHYSICAL: Blender's Principled BSDF. The others are previews: PHONG, diffuse and a normalised Blinn–Phong highlight per
+    pixel; GOURAUD, the same evaluated at the vertices and interpolated.
+    """
+
+    PHYSICAL = "PHYSICAL"
+    PHONG = "PHONG"
+    GOURAUD = "GOURAUD"
+
+
 MAXIMUM_LAYERS = 8
 
 
@@ -89,6 +108,11 @@ class RenderSettings:
     `debug_view` of layer `debug_layer` (0-based) replaces the composite.
     `transparent_film`: background alpha 0. `alpha_threshold`: surfaces with less alpha are not there.
     `seed` shifts every sampling pattern.
+    `shadow_map_size`: texels a side of the largest shadow map, a power of two. `shadow_memory` (MiB): for shadow maps
+    that are kept. `shadow_updates`: how many lights get new shadow maps per sample, the rest keep theirs meanwhile.
+    `world_directions`: from how many directions the world lights each sample.
+    `light_threshold` (W/(sr·m²)): radiance on a white surface below which one of many lights is sampled only now and
+    then; 0 samples all always.
     """
 
     width: int
@@ -110,3 +134,9 @@ class RenderSettings:
     transparent_film: bool = False
     alpha_threshold: float = 0.5
     seed: int = 0
+    shading_model: ShadingModel = ShadingModel.PHYSICAL
+    shadow_map_size: int = 2048
+    shadow_memory: int = 512
+    shadow_updates: int = 16
+    world_directions: int = 4
+    light_threshold: float = 0.01
