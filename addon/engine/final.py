@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 
 from ..render import Device, LayerImages, Plan, Renderer, frames_before
-from ..scene import Moment, Sequence
+from ..scene import Channel, Moment, Sequence
 from ..scene.arrays import Float32Array
 from . import frames, gl_jobs, messages, passes, regions, settings
 from .sessions import FinalSession
@@ -42,10 +42,9 @@ class FinalRender:
         finished = False
         try:
             wanted = passes.requested(depsgraph.view_layer)
-            channels = frozenset(item.channel for item in wanted)
             width, height = result.resolution_x, result.resolution_y
             border = regions.final_border(depsgraph.scene.render, engine, width, height)
-            how = settings.final(depsgraph.scene, width, height, channels, samples)
+            how = settings.final(depsgraph.scene, width, height, passes.channels(wanted), samples)
             with suppress(CancelledError):
                 self._read(depsgraph, frames_before(how.render))
                 now = self.frames.current.moment(border)
@@ -125,8 +124,8 @@ class FinalRender:
     def _write(self, renderer: Renderer, result: bpy.types.RenderResult, wanted: tuple[passes.OutputPass, ...]) -> None:
         """Put the samples so far into `result`."""
 
-        def read(_device: Device) -> dict[str, Float32Array]:
-            return {item.name: renderer.read(item.channel) for item in wanted}
+        def read(_device: Device) -> dict[Channel, Float32Array]:
+            return {channel: renderer.read(channel) for channel in passes.channels(wanted)}
 
-        passes.write(result, gl_jobs.finish(read))
+        passes.write(result, passes.images(wanted, gl_jobs.finish(read)))
         self.measured.first_picture_s = self.measured.first_picture_s or self._elapsed()

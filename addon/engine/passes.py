@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The one table of output passes: registered with Blender, asked of the renderer and written from here."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -19,6 +19,7 @@ class OutputPass:
     `flag`: the view layer's property that asks for it; empty for the pass that is always there.
     `names`: its name before Blender 5.0 and since.
     `channel_ids`: one letter per channel. `kind`: Blender's socket type.
+    `color`: the channel whose colour the light is divided by; None where the pass is `channel` itself.
     """
 
     channel: Channel
@@ -26,6 +27,7 @@ class OutputPass:
     names: tuple[str, str]
     channel_ids: str
     kind: Literal["VALUE", "VECTOR", "COLOR"]
+    color: Channel | None = None
 
     @property
     def name(self) -> str:
@@ -39,6 +41,25 @@ PASSES = (
     OutputPass(Channel.NORMAL, "use_pass_normal", ("Normal", "Normal"), "XYZ", "VECTOR"),
     OutputPass(Channel.POSITION, "use_pass_position", ("Position", "Position"), "XYZ", "VECTOR"),
     OutputPass(Channel.DIFFUSE_COLOR, "use_pass_diffuse_color", ("DiffCol", "Diffuse Color"), "RGB", "COLOR"),
+    OutputPass(
+        Channel.DIFFUSE_DIRECT,
+        "use_pass_diffuse_direct",
+        ("DiffDir", "Diffuse Direct"),
+        "RGB",
+        "COLOR",
+        Channel.DIFFUSE_COLOR,
+    ),
+    OutputPass(Channel.GLOSSY_COLOR, "use_pass_glossy_color", ("GlossCol", "Glossy Color"), "RGB", "COLOR"),
+    OutputPass(
+        Channel.GLOSSY_DIRECT,
+        "use_pass_glossy_direct",
+        ("GlossDir", "Glossy Direct"),
+        "RGB",
+        "COLOR",
+        Channel.GLOSSY_COLOR,
+    ),
+    OutputPass(Channel.EMISSION, "use_pass_emit", ("Emit", "Emission"), "RGB", "COLOR"),
+    OutputPass(Channel.ENVIRONMENT, "use_pass_environment", ("Env", "Environment"), "RGB", "COLOR"),
     OutputPass(Channel.OBJECT_INDEX, "use_pass_object_index", ("IndexOB", "Object Index"), "X", "VALUE"),
 )
 
@@ -46,6 +67,34 @@ PASSES = (
 def requested(view_layer: bpy.types.ViewLayer) -> tuple[OutputPass, ...]:
     """The passes that `view_layer` asks for, Combined first."""
     return tuple(item for item in PASSES if not item.flag or getattr(view_layer, item.flag))
+
+
+def channels(wanted: Iterable[OutputPass]) -> frozenset[Channel]:
+    """What the renderer must deliver for these passes."""
+    return frozenset(item for each in wanted for item in (each.channel, each.color) if item is not None)
+
+
+def images(wanted: Iterable[OutputPass], delivered: Mapping[Channel, Float32Array]) -> dict[str, Float32Array]:
+    """(H, W, C) float32 of each pass by its name in the running Blender, from all its channels (H, W, C)."""
+    return {
+        item.name: delivered[item.channel]
+        if item.color is None
+        else over(delivered[item.channel], delivered[item.color])
+        for item in wanted
+    }
+
+
+def over(light: Float32Array, color: Float32Array) -> Float32Array:
+    """`light` divided by the `color` that reflects it, both (H, W, 3) float32, as compositors multiply them again.
+
+    A channel whose colour is 0 gets the mean of those that have a colour, so that it is grey where it cannot be known;
+    black where none has one. Cycles' passes are divided so (`safe_divide_even_color`).
+    """
+    colored = color != 0.0
+    quotient = np.divide(light, color, out=np.zeros_like(light), where=colored)
+    count = colored.sum(axis=-1, keepdims=True)
+    mean = quotient.sum(axis=-1, keepdims=True) / np.maximum(count, 1)
+    return np.where(colored, quotient, mean.astype(np.float32))
 
 
 def register(engine: bpy.types.RenderEngine, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:

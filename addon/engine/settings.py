@@ -6,7 +6,7 @@ from enum import StrEnum
 from math import ceil
 from typing import Any
 
-from ..scene import Channel, DebugView, RenderSettings, Variant
+from ..scene import Channel, DebugView, RenderSettings, ShadingModel, Variant
 
 
 class SeparationUnit(StrEnum):
@@ -76,6 +76,12 @@ def _common(scene: Any, width: int, height: int) -> dict[str, Any]:
         "debug_view": DebugView(ours.debug_view),
         "debug_layer": min(ours.debug_layer, ours.layers) - 1,
         "seed": ours.seed,
+        "shading_model": ShadingModel(ours.shading_model),
+        "shadow_map_size": int(ours.shadow_map_size),
+        "shadow_memory": int(ours.shadow_memory),
+        "shadow_updates": ours.shadow_updates,
+        "world_directions": ours.world_directions,
+        "light_threshold": ours.light_threshold,
     }
 
 

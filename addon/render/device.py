@@ -16,7 +16,8 @@ from typing import Any, TypeVar
 import moderngl
 
 from ..scene import Layering
-from .ggx_albedo import TABLE_SIZE, ggx_albedo_table
+from .ggx_albedo import ggx_albedo_table
+from .ltc import ltc_table
 from .programs import ProgramLibrary
 from .raw_gl import RawGL, vertex_layer_extension
 
@@ -45,8 +46,12 @@ class Device:
         self.no_framebuffer = self.context.detect_framebuffer(0)
         self.zero_to_one_depth = self.raw.set_clip_space(zero_to_one=True)
         self.programs = ProgramLibrary(self.context)
-        self.ggx_albedo = self.context.texture((TABLE_SIZE, TABLE_SIZE), 2, ggx_albedo_table(), dtype="f4")
-        self.ggx_albedo.repeat_x = self.ggx_albedo.repeat_y = False
+        table = ggx_albedo_table()
+        self.ggx_albedo = self.context.texture3d(table.shape[2::-1], 4, table, dtype="f4")
+        self.ggx_albedo.repeat_x = self.ggx_albedo.repeat_y = self.ggx_albedo.repeat_z = False
+        transforms = ltc_table()
+        self.ltc = self.context.texture(transforms.shape[1::-1], 4, transforms, dtype="f4")
+        self.ltc.repeat_x = self.ltc.repeat_y = False
         self.name = f"{self.context.info['GL_RENDERER']}, OpenGL {self.context.info['GL_VERSION']}"
         self.maximum_size = min(self.context.info["GL_MAX_TEXTURE_SIZE"], *self.context.info["GL_MAX_VIEWPORT_DIMS"])
         self.is_software = any(word in self.name.lower() for word in ("llvmpipe", "softpipe", "swrast", "swiftshader"))
@@ -67,6 +72,7 @@ class Device:
 
     def release(self) -> None:
         """Free the shared objects and the context."""
+        self.ltc.release()
         self.ggx_albedo.release()
         self.programs.release()
         self.context.release()

@@ -16,14 +16,15 @@ MATERIAL_UNIFORMS = UniformBlock(
     (
         ("material_base_color", "vec4"),  # rgb, F0
         ("material_emission", "vec4"),  # rgb, alpha
-        ("material_surface", "vec4"),  # metallic, roughness
+        ("material_surface", "vec4"),  # metallic, roughness, diffuse roughness
     ),
 )
 
 
 @dataclass(frozen=True)
 class Draw:
-    """One instanced draw: the triangles of one slot of one batch. `surface`: the defines of its material."""
+    """One instanced draw: the triangles of one slot of one batch. `surface`: the defines of its material, `alpha` its
+    constant factor."""
 
     batch: InstanceBatch
     first_index: int
@@ -31,10 +32,11 @@ class Draw:
     material_offset: int
     surface: frozenset[str]
     texture: ImageTexture | None
+    alpha: float
 
 
 class SceneDraws:
-    """The draws of one scene, and its materials' constants on the GPU."""
+    """The draws of one scene, those that the camera sees among them, and its materials' constants on the GPU."""
 
     def __init__(self, device: Device, scene: Scene, alpha_threshold: float) -> None:
         self.scene = scene
@@ -42,11 +44,12 @@ class SceneDraws:
         self._device = device
         self._materials, offsets = _upload_materials(device, scene)
         self.draws = tuple(_draws(scene, alpha_threshold, offsets))
+        self.seen = tuple(draw for draw in self.draws if draw.batch.seen_by_camera)
 
     @property
     def triangles(self) -> int:
         """Triangles of one geometry pass, instances counted."""
-        return sum(draw.index_count // 3 * draw.batch.count for draw in self.draws)
+        return sum(draw.index_count // 3 * draw.batch.count for draw in self.seen)
 
     def bind_material(self, draw: Draw, binding: int) -> None:
         """Bind the constants of a draw's material."""
@@ -102,7 +105,7 @@ def _draws(scene: Scene, alpha_threshold: float, offsets: dict[str, int]) -> Ite
                 continue
             surface = _surface_defines(material)
             texture = material.texture if "TEXTURE" in surface else None
-            yield Draw(batch, 3 * slot.first, 3 * slot.count, offsets[material.key], surface, texture)
+            yield Draw(batch, 3 * slot.first, 3 * slot.count, offsets[material.key], surface, texture, material.alpha)
 
 
 def _surface_defines(material: Material) -> frozenset[str]:
@@ -124,5 +127,5 @@ def _pack_material(material: Material) -> bytes:
     return MATERIAL_UNIFORMS.pack(
         material_base_color=(*material.base_color, material.specular),
         material_emission=(*np.minimum(material.emission, np.finfo(np.float32).max), material.alpha),
-        material_surface=(material.metallic, material.roughness, 0.0, 0.0),
+        material_surface=(material.metallic, material.roughness, material.diffuse_roughness, 0.0),
     )

@@ -15,8 +15,8 @@ from .device import Device, RenderError
 
 MESH_ATTRIBUTES = ("3f", "in_position"), ("3f", "in_normal"), ("2f", "in_uv"), ("4f", "in_color")
 INSTANCE_FORMAT = "4f 4f 4f 3f 1i/i"
-INSTANCE_ATTRIBUTES = ("in_row_0", "in_row_1", "in_row_2", "in_translation_low", "in_object_index")
-_INSTANCE_DTYPE = np.dtype([("rows", "f4", (3, 4)), ("translation_low", "f4", 3), ("object_index", "i4")])
+INSTANCE_ATTRIBUTES = ("in_row_0", "in_row_1", "in_row_2", "in_translation_low", "in_indices")
+_INSTANCE_DTYPE = np.dtype([("rows", "f4", (3, 4)), ("translation_low", "f4", 3), ("indices", "i4")])
 _POSES_PER_ROW = 1024
 _TEXELS_PER_POSE = 4
 
@@ -118,11 +118,11 @@ def drawing_order(batch: InstanceBatch) -> Int64Array:
 
 
 def pack_instances(batch: InstanceBatch) -> bytes:
-    """Matrix rows, low parts of the translations and pass indices in drawing order, as the vertex shader reads them."""
+    """Matrix rows, low parts of the translations and indices in drawing order, as the vertex shader reads them."""
     order = drawing_order(batch)
     packed = np.empty(batch.count, _INSTANCE_DTYPE)
     packed["rows"], packed["translation_low"] = _split_poses(batch.matrices[order])
-    packed["object_index"] = batch.object_index[order]
+    packed["indices"] = np.clip(batch.object_index[order], 0, 0xFFFF) | batch.link_group << 16
     return packed.tobytes()
 
 
@@ -222,7 +222,7 @@ class GeometryStore:
             content: list[tuple[Any, ...]] = [attribute for attribute in buffers.attributes if attribute[2] in program]
             content += [(self._positions_at(mesh, places), "3f", name) for places, name in moved]
             used = [name for name in INSTANCE_ATTRIBUTES if name in program]
-            instance_layout = INSTANCE_FORMAT if "in_object_index" in program else "4f 4f 4f 3f 4x/i"
+            instance_layout = INSTANCE_FORMAT if "in_indices" in program else "4f 4f 4f 3f 4x/i"
             content.append((self._batch(batch).buffer, instance_layout, *used))
             vertex_array = self._context.vertex_array(program, content, buffers.indices, index_element_size=4)
             if copies > 1:

@@ -5,27 +5,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf
 
-from ..scene import Channel, DebugView, RenderSettings, Scene, Variant
-from .direct_needs import direct_needs
+from ..scene import Camera, Channel, DebugView, RenderSettings, Scene, Variant
 from .layout import CHANNELS, EXIT_CHANNELS, GBufferChannel, TargetSpec
-
-
-@dataclass(frozen=True)
-class PlannedPass:
-    """A pass that runs: target names it reads, targets it writes, its shader defines."""
-
-    name: str
-    reads: tuple[str, ...] = ()
-    writes: tuple[TargetSpec, ...] = ()
-    defines: frozenset[str] = frozenset()
-
-
-@dataclass(frozen=True)
-class LeftOut:
-    """Something the scene or the settings do not need, and why."""
-
-    name: str
-    reason: str
+from .lighting_passes import SPLIT_TARGETS, plan_lighting_passes
+from .lighting_plan import LightPlan, plan_lights
+from .planned_pass import LeftOut, PlannedPass
 
 
 @dataclass(frozen=True)
@@ -34,7 +18,7 @@ class Plan:
 
     `layers`: how many are built, by `variant`, which is TWO_PASS for a single one. `channels`: those that somebody
     reads, each with how many layers of it, the nearest first. `look_ahead`: whether an extra layer shows the next
-    picture's depth. `guard_band`: pixels around the picture, on each side.
+    picture's depth. `guard_band`: pixels around the picture, on each side. `lights`: what lights it.
     """
 
     passes: tuple[PlannedPass, ...]
@@ -44,6 +28,7 @@ class Plan:
     channels: tuple[tuple[GBufferChannel, int], ...]
     look_ahead: bool
     guard_band: int
+    lights: LightPlan
 
     @property
     def one_pass(self) -> bool:
@@ -65,11 +50,11 @@ class Plan:
         return tuple(target for planned in self.passes for target in planned.writes)
 
 
-MEAN_CHANNELS = frozenset({Channel.NORMAL, Channel.DIFFUSE_COLOR})
-"""Film images besides COMBINED that are means over samples."""
-
 FIRST_SAMPLE_CHANNELS = frozenset({Channel.DEPTH, Channel.POSITION, Channel.OBJECT_INDEX})
 """Film images taken from sample 0 alone, through pixel centres: means of them are meaningless."""
+
+MEAN_CHANNELS = frozenset(Channel) - FIRST_SAMPLE_CHANNELS - {Channel.COMBINED}
+"""Film images besides COMBINED that are means over samples."""
 
 SUM_CHANNELS = (Channel.COMBINED, *sorted(MEAN_CHANNELS))
 """Images that the composite pass adds up, in attachment order."""
@@ -100,17 +85,30 @@ _FILM_CHANNELS = {
     Channel.POSITION: {"view_depth"},
     Channel.DIFFUSE_COLOR: {"view_depth", "normal", "base_color", "material"},
     Channel.OBJECT_INDEX: {"view_depth", "object_index"},
+    Channel.GLOSSY_COLOR: {"view_depth", "normal", "base_color", "material"},
+    Channel.DIFFUSE_DIRECT: {"view_depth"},
+    Channel.GLOSSY_DIRECT: {"view_depth"},
+    Channel.EMISSION: {"view_depth", "emission"},
+    Channel.ENVIRONMENT: {"view_depth"},
 }
 
 
-def plan(scene: Scene, settings: RenderSettings, *, continuous: bool = False) -> Plan:
-    """Decide the passes for one scene and one set of settings; `continuous` as in `Sequence`."""
+def plan(
+    scene: Scene, settings: RenderSettings, camera: Camera | None = None, *, continuous: bool = False
+) -> Plan:
+    """Decide the passes for one scene, seen by a camera (None: it may be anywhere), and one set of settings.
+
+    `continuous` as in `Sequence`.
+    """
     left_out: list[LeftOut] = []
     layers = _layer_count(settings, left_out)
     variant = settings.variant if layers > 1 else Variant.TWO_PASS
     look_ahead = _looks_ahead(variant, settings, continuous=continuous)
     guard_band = _plan_guard_band(settings, variant, left_out)
-    direct = _plan_direct(scene, settings, layers, left_out)
+    lights, dark = plan_lights(scene, settings, camera, continuous=continuous)
+    left_out += [LeftOut(name, reason) for name, reason in dark]
+    lighting = plan_lighting_passes(scene, settings, lights, layers, left_out)
+    direct = lighting[-1] if lighting else None
     channels = _read_channels(scene, settings, direct, layers, left_out)
     one_pass = variant is not Variant.TWO_PASS
     drawn_layers = layers + look_ahead if one_pass else layers
@@ -127,10 +125,10 @@ def plan(scene: Scene, settings: RenderSettings, *, continuous: bool = False) ->
         *_plan_oracle(variant, layers, left_out, continuous=continuous),
         gbuffer,
         *_plan_exit(settings, drawn_layers, left_out),
-        *((direct,) if direct else ()),
+        *lighting,
         _plan_composite(scene, settings, direct),
     ]
-    return Plan(tuple(passes), tuple(left_out), layers, variant, channels, look_ahead, guard_band)
+    return Plan(tuple(passes), tuple(left_out), layers, variant, channels, look_ahead, guard_band, lights)
 
 
 def frames_before(settings: RenderSettings) -> int:
@@ -224,33 +222,6 @@ def _plan_exit(settings: RenderSettings, layers: int, left_out: list[LeftOut]) -
     return (PlannedPass("exit", reads=("gbuffer.view_depth",), writes=writes),)
 
 
-def _plan_direct(scene: Scene, settings: RenderSettings, layers: int, left_out: list[LeftOut]) -> PlannedPass | None:
-    lit = bool(scene.lights) or max(scene.world.radiance) > 0.0
-    emissive = any(material.is_emissive for material in scene.materials.values())
-    if not scene.batches:
-        left_out.append(LeftOut("direct", "no geometry"))
-        return None
-    if not lit and not emissive:
-        left_out.append(LeftOut("direct", "no light, emission or world"))
-        return None
-    if settings.debug_view not in (DebugView.NONE, DebugView.DIRECT) and not settings.deep_output:
-        left_out.append(LeftOut("direct", "the debug view shows the G-buffer only"))
-        return None
-    needs = direct_needs(scene)
-    left_out += [LeftOut(f"direct {name.lower()}", reason) for name, (wanted, reason) in needs.items() if not wanted]
-    reads = ["view_depth"]
-    if lit:
-        reads += ["normal", "base_color", "material"]
-    if emissive:
-        reads.append("emission")
-    return PlannedPass(
-        "direct",
-        reads=tuple(f"gbuffer.{name}" for name in reads),
-        writes=(TargetSpec("direct.radiance", 4, "f4", layers),),
-        defines=frozenset(name for name, (wanted, _) in needs.items() if wanted),
-    )
-
-
 def _read_channels(
     scene: Scene, settings: RenderSettings, direct: PlannedPass | None, layers: int, left_out: list[LeftOut]
 ) -> tuple[tuple[GBufferChannel, int], ...]:
@@ -262,7 +233,7 @@ def _read_channels(
             read[name] = max(read.get(name, 0), count)
 
     if direct:
-        add((name.removeprefix("gbuffer.") for name in direct.reads), layers)
+        add((name.removeprefix("gbuffer.") for name in direct.reads if name.startswith("gbuffer.")), layers)
     for channel in settings.channels:
         add(_FILM_CHANNELS.get(channel, ()), 1)
     if _debug_target(settings).startswith("gbuffer."):
@@ -291,14 +262,21 @@ def _plan_composite(scene: Scene, settings: RenderSettings, direct: PlannedPass 
         if settings.debug_view is DebugView.DIRECT and not direct:
             defines.remove("DEBUG_DIRECT")
     defines |= {f"FILM_{channel.value}" for channel in settings.channels & MEAN_CHANNELS}
-    if Channel.DIFFUSE_COLOR in settings.channels and any(material.is_glossy for material in scene.materials.values()):
-        defines.add("SPECULAR")
+    materials = scene.materials.values()
+    if settings.channels & {Channel.DIFFUSE_COLOR, Channel.GLOSSY_COLOR}:
+        defines |= {"SPECULAR"} if any(material.is_glossy for material in materials) else set[str]()
+        rough = any(material.diffuse_roughness > 0.0 for material in materials)
+        defines |= {"DIFFUSE_ROUGHNESS"} if rough else set[str]()
+    defines |= {"ENVIRONMENT"} if scene.world.environment is not None else set[str]()
+    defines |= {"SPLIT"} if direct and settings.channels & SPLIT_TARGETS.keys() else set[str]()
     reads = {"view_depth"}.union(*(_FILM_CHANNELS[channel] for channel in settings.channels & MEAN_CHANNELS))
     targets = [f"gbuffer.{name}" for name in sorted(reads)]
     shown = [_debug_target(settings), *(["exit.view_depth"] if _debug_target(settings).startswith("exit.") else [])]
     targets += [name for name in dict.fromkeys(shown) if name and name not in targets]
     if defines & {"DIRECT", "DEBUG_DIRECT"}:
         targets.append("direct.radiance")
+    if "SPLIT" in defines:
+        targets += SPLIT_TARGETS.values()
     writes = tuple(
         film_target(channel) for channel in SUM_CHANNELS if channel in settings.channels | {Channel.COMBINED}
     )

@@ -43,7 +43,10 @@ class LayerImages:
 
 
 def read_target(pool: TexturePool, name: str) -> Float32Array:
-    """A target as (layers, H, W, components) float32 without its guard band; normalised formats scaled to 0…1."""
+    """A target as (layers, H, W, components) float32 without its guard band; normalised formats scaled to 0…1.
+
+    Where a texel is for several pixels, the guard band's are there as well.
+    """
     texture = pool.texture(name)
     width, height, layers = texture.size
     dtype = _NUMPY_TYPES[texture.dtype]

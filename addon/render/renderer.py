@@ -13,6 +13,7 @@ from .draws import DrawLists
 from .film import Film
 from .geometry import GeometryStore
 from .images import ImageStore
+from .lighting import Lighting
 from .layering import Trial, calibration_view, resolved
 from .oracle_state import OracleState
 from .passes import PASSES, Frame, Pass
@@ -35,6 +36,7 @@ class Renderer:
         self._correspondences: list[tuple[Scene, Correspondence]] = []
         self._images = ImageStore(device)
         self._oracle = OracleState()
+        self._lighting = Lighting(device)
         self._film = Film(device)
         self._timers = PassTimers(device)
         self._passes: dict[str, Pass] = {}
@@ -55,7 +57,7 @@ class Renderer:
         self._frame = None
         oracle, self._oracle = self._oracle, OracleState()  # where anything fails, nothing is known any more
         sequence = sequence or Sequence()
-        planned = plan(scene, settings, continuous=sequence.continuous)
+        planned = plan(scene, settings, camera, continuous=sequence.continuous)
         self._pool.prepare(
             (settings.width, settings.height),
             planned.targets,
@@ -64,6 +66,7 @@ class Renderer:
         )
         frames = surroundings(Moment(scene, camera), sequence, planned, settings)
         self._upload(scene, frames.history.scene if frames.history else scene, settings.alpha_threshold)
+        self._lighting.begin(scene, settings, planned.lights, frames.view.position)
         oracle.begin(oracle_depends_on(settings, planned), continuous=sequence.continuous)
         self._film.samples = 0
         self._first_sample, self._layers = {}, ()
@@ -76,6 +79,7 @@ class Renderer:
             images=self._images,
             film=self._film,
             oracle=oracle,
+            lighting=self._lighting,
             correspondence=self._correspondence,
             scene=scene,
             settings=settings,
@@ -132,6 +136,9 @@ class Renderer:
         sizes = self._pool.bytes()
         if self._pool.guard_band:
             sizes["of these, guard band"] = self._pool.guard_band_bytes()
+        shadows = frame.shadows
+        if shadows is not None:
+            sizes["shadow maps"] = shadows.bytes
         sizes["geometry"] = self._geometry.bytes()
         sizes["images"] = self._images.bytes()
         return RenderStatistics(
@@ -139,11 +146,13 @@ class Renderer:
             passes=self._timers.milliseconds(),
             left_out=tuple((left.name, left.reason) for left in frame.plan.left_out),
             triangles=draws.triangles,
-            draws=len(draws.draws),
-            instances=sum(batch.count for batch in frame.scene.batches),
+            draws=len(draws.seen),
+            instances=sum(batch.count for batch in frame.scene.batches if batch.seen_by_camera),
             bytes=sizes,
             warnings=self._warnings,
             device=self._device.name,
+            shadow_maps_drawn=shadows.drawn if shadows else 0,
+            shadow_maps_kept=shadows.kept if shadows else 0,
         )
 
     def release(self) -> None:
@@ -155,6 +164,7 @@ class Renderer:
         self._images.release()
         self._geometry.release()
         self._pool.release()
+        self._lighting.release()
         self._oracle = OracleState()
         self._correspondences.clear()
         self._timers.forget()

@@ -14,7 +14,8 @@ from .device import Device
 @dataclass(frozen=True)
 class RenderStatistics:
     """`upload_s` of the last `begin`; milliseconds per pass of the last sample; reasons for what was left out;
-    triangles (instances counted), draws and instances of one geometry pass; bytes of video memory per target.
+    triangles (instances counted), draws and instances of one geometry pass; bytes of video memory per target; how many
+    shadow maps were drawn since `begin`, and how often one was there already.
     """
 
     upload_s: float
@@ -26,6 +27,8 @@ class RenderStatistics:
     bytes: dict[str, int]
     warnings: tuple[str, ...]
     device: str
+    shadow_maps_drawn: int = 0
+    shadow_maps_kept: int = 0
 
 
 class PassTimers:

@@ -16,7 +16,8 @@ DEPTH_NAME = "gbuffer.depth"
 
 
 class TexturePool:
-    """The targets of one view: texture arrays of the picture's size or of that plus the guard band, and a depth array.
+    """The targets of one view: texture arrays of the picture's size or of that plus the guard band, or of a texel for
+    every few pixels of either, and a depth array.
 
     Of the hardware depth, 1 is nearest and 0 farthest.
     """
@@ -34,7 +35,7 @@ class TexturePool:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height in pixels of every guarded target."""
+        """Width and height in pixels of what guarded targets cover."""
         width, height = self._picture_size
         return width + 2 * self._guard_band, height + 2 * self._guard_band
 
@@ -74,7 +75,7 @@ class TexturePool:
         try:
             if self._depth is None:
                 self._depth = self._device.raw.new_depth_array(*self.size, depth_layers)
-                self._check_memory(DEPTH_NAME, DEPTH_BYTES * depth_layers, self.size)
+                self._check_memory(DEPTH_NAME, self._depth_bytes(self.size))
             for name, spec in wanted.items():
                 if name not in self._textures:
                     self._textures[name] = self._allocate(spec)
@@ -88,8 +89,9 @@ class TexturePool:
         return self._textures[name]
 
     def margin(self, name: str) -> int:
-        """Pixels that a target has around the picture, on each side."""
-        return self._guard_band if self._specs[name].guarded else 0
+        """Texels a target has around the picture, on each side; 0 where one is for several pixels, maybe of both."""
+        spec = self._specs[name]
+        return self._guard_band if spec.guarded and spec.divisor == 1 else 0
 
     def read(self, name: str) -> bytes:
         """A target's texels, tightly packed, layer after layer, guard band included.
@@ -157,14 +159,14 @@ class TexturePool:
 
     def bytes(self) -> dict[str, int]:
         """Bytes of video memory per target, guard band included."""
-        return {name: per_pixel * _pixels(self._size_of(name)) for name, per_pixel in self._bytes_per_pixel().items()}
+        whole = {name: spec.bytes_per_texel * _area(self._texels(spec)) for name, spec in self._specs.items()}
+        return whole | ({DEPTH_NAME: self._depth_bytes(self.size)} if self._depth is not None else {})
 
     def guard_band_bytes(self) -> int:
         """Bytes of video memory that the guard band takes in all targets."""
-        return sum(
-            per_pixel * (_pixels(self._size_of(name)) - _pixels(self._picture_size))
-            for name, per_pixel in self._bytes_per_pixel().items()
-        )
+        alone = sum(spec.bytes_per_texel * _area(spec.size(self._picture_size)) for spec in self._specs.values())
+        alone += self._depth_bytes(self._picture_size) if self._depth is not None else 0
+        return sum(self.bytes().values()) - alone
 
     def release(self) -> None:
         """Free every texture and framebuffer."""
@@ -189,21 +191,20 @@ class TexturePool:
         self._framebuffers.clear()
         self._layered_framebuffers.clear()
 
-    def _bytes_per_pixel(self) -> dict[str, int]:
-        sizes = {name: spec.bytes_per_pixel for name, spec in self._specs.items()}
-        return sizes | ({DEPTH_NAME: DEPTH_BYTES * self._depth_layers} if self._depth is not None else {})
+    def _texels(self, spec: TargetSpec) -> tuple[int, int]:
+        return spec.size(self.size if spec.guarded else self._picture_size)
 
-    def _size_of(self, name: str) -> tuple[int, int]:
-        return self.size if name == DEPTH_NAME or self._specs[name].guarded else self._picture_size
+    def _depth_bytes(self, size: tuple[int, int]) -> int:
+        return DEPTH_BYTES * self._depth_layers * _area(size)
 
     def _allocate(self, spec: TargetSpec) -> moderngl.TextureArray:
-        size = self.size if spec.guarded else self._picture_size
+        size = self._texels(spec)
         try:
             texture = self._device.context.texture_array((*size, spec.layers), spec.components, dtype=spec.dtype)
         except moderngl.Error as error:
-            raise self._too_large(spec.name, spec.bytes_per_pixel, size) from error
+            raise self._too_large(spec.name, spec.bytes_per_texel * _area(size)) from error
         try:
-            self._check_memory(spec.name, spec.bytes_per_pixel, size)
+            self._check_memory(spec.name, spec.bytes_per_texel * _area(size))
         except RenderError:
             texture.release()
             raise
@@ -222,15 +223,16 @@ class TexturePool:
                 f"the device can render (1 to {limit} pixels a side). Lower the guard band or the resolution."
             )
 
-    def _check_memory(self, name: str, bytes_per_pixel: int, size: tuple[int, int]) -> None:
+    def _check_memory(self, name: str, size: int) -> None:
         if self._device.out_of_memory():
-            raise self._too_large(name, bytes_per_pixel, size)
+            raise self._too_large(name, size)
 
-    def _too_large(self, name: str, bytes_per_pixel: int, size: tuple[int, int]) -> RenderError:
-        guarded = f", guard band of {self._guard_band} pixels included" if size != self._picture_size else ""
+    def _too_large(self, name: str, size: int) -> RenderError:
+        width, height = self.size
+        guarded = f", guard band of {self._guard_band} pixels included" if self._guard_band else ""
         return RenderError(
-            f"Out of graphics memory for target {name}: {bytes_per_pixel * _pixels(size) / 2**20:.0f} MiB at "
-            f"{size[0]}×{size[1]}{guarded}. Lower the resolution or the number of layers."
+            f"Out of graphics memory for target {name}: {size / 2**20:.0f} MiB at "
+            f"{width}×{height}{guarded}. Lower the resolution or the number of layers."
         )
 
 
@@ -238,5 +240,5 @@ def _undrawable(names: Iterable[str]) -> RenderError:
     return RenderError(f"The graphics driver cannot draw into the formats of {', '.join(names)}.")
 
 
-def _pixels(size: tuple[int, int]) -> int:
+def _area(size: tuple[int, int]) -> int:
     return size[0] * size[1]

@@ -19,10 +19,10 @@ LARGEST_DRIFT = 1.0
 def pixel_drift(first: Moment, second: Moment, width: int, height: int) -> float:
     """A bound, in pixels, on how far anything that is seen in `second` is on screen from where it was in `first`.
 
-    `width`, `height`: pixels of the picture that both cameras' windows show. Bounds hold per instance, for its
-    bounding box, so they may be several times too large, but they vanish with the motion that causes them and are
-    0.0 where nothing moved at all. Never more than `LARGEST_DRIFT`, which is also the answer where one of the cameras
-    is orthographic and the other is not.
+    What only casts shadows is not seen. `width`, `height`: pixels of the picture that both cameras' windows show.
+    Bounds hold per instance, for its bounding box, so they may be several times too large, but they vanish with the
+    motion that causes them and are 0.0 where nothing moved at all. Never more than `LARGEST_DRIFT`, which is also the
+    answer where one of the cameras is orthographic and the other is not.
     """
     if first.camera.orthographic != second.camera.orthographic:
         return LARGEST_DRIFT
@@ -30,8 +30,10 @@ def pixel_drift(first: Moment, second: Moment, width: int, height: int) -> float
     drift = math.hypot(*views.window_drift)
     correspondence = Correspondence(first.scene)
     meshes = second.scene.meshes
-    deformations = {key: _deformation(mesh, correspondence.positions(mesh)) for key, mesh in meshes.items()}
-    for batch in second.scene.batches:
+    seen = [batch for batch in second.scene.batches if batch.seen_by_camera]
+    drawn = {batch.mesh for batch in seen}
+    deformations = {key: _deformation(meshes[key], correspondence.positions(meshes[key])) for key in drawn}
+    for batch in seen:
         if drift >= LARGEST_DRIFT:
             break
         moved = _moved(batch, correspondence.matrices(batch), meshes[batch.mesh], deformations[batch.mesh])

@@ -44,15 +44,15 @@ def is_cut(previous: Moment, current: Moment) -> bool:
 def same_population(first: Scene, second: Scene) -> bool:
     """Whether two scenes show the same instances, of meshes with the same triangles, with the same holes in them.
 
-    Where and how large they are may differ, and so may all that only colours them.
+    Where and how large they are may differ, and so may all that only colours them or only shades others.
     """
     if first is second:
         return True
     mine, theirs = _instances(first), _instances(second)
     if mine.keys() != theirs.keys() or not all(_same_ids(mine[key], theirs[key]) for key in mine):
         return False
-    pierced = {batch.mesh for batch in second.batches if _is_pierced(second, batch)}
-    keys = {batch.mesh for batch in second.batches if batch.count}
+    pierced = {batch.mesh for batch in _seen(second) if _is_pierced(second, batch)}
+    keys = {batch.mesh for batch in _seen(second)}
     return all(_same_surface(first.meshes[key], second.meshes[key], with_uvs=key in pierced) for key in keys)
 
 
@@ -93,13 +93,18 @@ def _field_of_view(camera: Camera) -> float:
 
 def _reach(scene: Scene, *cameras: Camera) -> float:
     """The largest of the scene's radius and the cameras' distances to its middle, m; 0 where there is no scene."""
-    boxes = [_box(batch, scene.meshes[batch.mesh]) for batch in scene.batches if batch.count]
+    boxes = [_box(batch, scene.meshes[batch.mesh]) for batch in _seen(scene)]
     if not boxes:
         return 0.0
     low = np.min([box[0] for box in boxes], axis=0)
     high = np.max([box[1] for box in boxes], axis=0)
     distances = [float(np.linalg.norm(camera.position - 0.5 * (low + high))) for camera in cameras]
     return max(0.5 * float(np.linalg.norm(high - low)), *distances)
+
+
+def _seen(scene: Scene) -> list[InstanceBatch]:
+    """Batches that are placed in front of cameras."""
+    return [batch for batch in scene.batches if batch.count and batch.seen_by_camera]
 
 
 def _box(batch: InstanceBatch, mesh: Mesh) -> tuple[Float64Array, Float64Array]:
@@ -111,12 +116,11 @@ def _box(batch: InstanceBatch, mesh: Mesh) -> tuple[Float64Array, Float64Array]:
 
 
 def _instances(scene: Scene) -> dict[tuple[str, Hashable], list[InstanceBatch]]:
-    """Batches that are placed, by their mesh and by what of their materials decides where there is surface."""
+    """Batches that are seen, by their mesh and by what of their materials decides where there is surface."""
     groups: dict[tuple[str, Hashable], list[InstanceBatch]] = {}
-    for batch in scene.batches:
-        if batch.count:
-            holes = tuple(_holes(scene, scene.materials[key]) for key in batch.materials)
-            groups.setdefault((batch.mesh, holes), []).append(batch)
+    for batch in _seen(scene):
+        holes = tuple(_holes(scene, scene.materials[key]) for key in batch.materials)
+        groups.setdefault((batch.mesh, holes), []).append(batch)
     return groups
 
 

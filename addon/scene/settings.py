@@ -82,8 +82,8 @@ class Layering(StrEnum):
 class ShadingModel(StrEnum):
     """How surfaces reflect direct light.
 
-    PHYSICAL: Blender's Principled BSDF. The others are previews: PHONG, diffuse and a normalised Blinn–Phong highlight per
-    pixel; GOURAUD, the same evaluated at the vertices and interpolated.
+    PHYSICAL: Blender's Principled BSDF. The others are previews: PHONG, diffuse and a normalised Blinn–Phong highlight
+    per pixel; GOURAUD, the same evaluated at the vertices and interpolated.
     """
 
     PHYSICAL = "PHYSICAL"

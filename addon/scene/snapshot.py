@@ -19,12 +19,12 @@ import numpy as np
 
 from .geometry import InstanceBatch, Mesh
 from .materials import Image, Material
-from .scene import Scene, Versions
+from .scene import EnvironmentMap, Scene, Versions
 from .versions import new_version
 
 FORMAT_VERSION = 3
 _HEADER = "header"
-_SHARED = (Mesh, Material, Image, InstanceBatch)
+_SHARED = (Mesh, Material, Image, InstanceBatch, EnvironmentMap)
 """Types of which several scenes may hold the same object."""
 
 
@@ -129,6 +129,8 @@ class _Reader:
         """The value of type `kind` from its JSON."""
         if value is None:
             return None
+        if typing.get_origin(kind) in (types.UnionType, typing.Union):  # Optional: the alternative that is not None
+            kind = next(item for item in typing.get_args(kind) if item is not types.NoneType)
         if isinstance(value, dict) and isinstance(value.get("array"), str):
             return self._arrays[value["array"]]
         if isinstance(value, dict) and isinstance(value.get("item"), int):
@@ -163,9 +165,6 @@ class _Reader:
     def _restore_generic(self, kind: Any, value: Any) -> Any:
         """The value of a parametrised or basic type from its JSON."""
         origin, arguments = typing.get_origin(kind), typing.get_args(kind)
-        if origin in (types.UnionType, typing.Union):
-            # Optional: the one alternative that is not None. Arrays and None were restored before.
-            return self.restore(next(item for item in arguments if item is not type(None)), value)
         if origin is tuple:
             item_types = [arguments[0]] * len(value) if arguments[-1] is Ellipsis else arguments
             return tuple(self.restore(item, part) for item, part in zip(item_types, value, strict=True))

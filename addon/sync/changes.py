@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..scene import InstanceBatch, Light, Scene
+from ..scene import EnvironmentMap, InstanceBatch, Light, Scene
 from ..scene.arrays import same_array
 from ..scene.versions import new_version
 
@@ -21,10 +21,15 @@ def same_fields(first: DataclassInstance | None, second: DataclassInstance | Non
     """Whether two dataclass values are equal, those of their fields that are arrays included."""
     if first is None or second is None:
         return first is second
-    return all(
-        same_array(a, b) if isinstance(a, np.ndarray) else a == b
-        for a, b in ((getattr(first, field.name), getattr(second, field.name)) for field in fields(first))
-    )
+    return all(_same(getattr(first, field.name), getattr(second, field.name)) for field in fields(first))
+
+
+def _same(first: object, second: object) -> bool:
+    if isinstance(first, np.ndarray):
+        return isinstance(second, np.ndarray) and same_array(first, second)
+    if isinstance(first, EnvironmentMap) and isinstance(second, EnvironmentMap):
+        return first is second or (first.key, first.name, first.version) == (second.key, second.name, second.version)
+    return first == second
 
 
 def with_versions(scene: Scene, previous: Scene) -> Scene:
@@ -37,7 +42,7 @@ def with_versions(scene: Scene, previous: Scene) -> Scene:
         ),
         "lights": not _same_lights(scene.lights, previous.lights),
         "camera": not same_fields(scene.camera, previous.camera),
-        "world": scene.world != previous.world,
+        "world": not same_fields(scene.world, previous.world),
     }
     raised = {name: new_version() for name, differs in changed.items() if differs}
     if not raised:

@@ -5,20 +5,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..scene import Scene
 from .changes import Messages
 
 if TYPE_CHECKING:
     import bpy
 
 
-def effect_messages(depsgraph: bpy.types.Depsgraph, mirrored: Scene, messages: Messages) -> None:
-    """Report the effects that `mirrored`, the scene of `depsgraph`, would show; nothing while editing."""
+def effect_messages(depsgraph: bpy.types.Depsgraph, messages: Messages) -> None:
+    """Report the effects that the scene of `depsgraph` would show; nothing while editing."""
     if depsgraph.mode != "RENDER":
         return
     scene: Any = depsgraph.scene_eval
-    if any(light.casts_shadow for light in mirrored.lights) or any(mirrored.world.radiance):
-        messages.add("scene", "shadows", "Shadows are not rendered yet.")
     camera = scene.camera
     if camera is not None and camera.type == "CAMERA" and camera.data.dof.use_dof:
         text = f"Camera “{camera.name}” has depth of field, which is not rendered yet; everything is in focus."

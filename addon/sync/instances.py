@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
@@ -16,18 +16,36 @@ import numpy as np
 from ..scene import InstanceBatch
 from ..scene.arrays import BoolArray, Float64Array
 from .changes import Messages, new_version
+from .linking import LinkGroup
 from .visibility import same_batch
 
 _FLATTEST = 1e-5
 
 
+class Traits(NamedTuple):
+    """How the instances of one batch take part; see `InstanceBatch`."""
+
+    seen_by_camera: bool = True
+    casts_shadow: bool = True
+    link_group: LinkGroup = LinkGroup()
+
+    @property
+    def differences(self) -> tuple[str, ...]:
+        """What tells them from instances that are seen, cast shadows and are not linked."""
+        unusual = (not self.seen_by_camera, "unseen"), (not self.casts_shadow, "shadowless")
+        linked = (f"linked {self.link_group.label}",) if self.link_group.number else ()
+        return (*(word for holds, word in unusual if holds), *linked)
+
+
 @dataclass
 class Placements:
-    """The instances of one mesh with one assignment of materials: rows of the depsgraph's list, in its order."""
+    """The instances of one mesh with one assignment of materials, alike in their traits: rows of the depsgraph's list,
+    in its order."""
 
     key: str
     mesh: str
     materials: tuple[str, ...]
+    traits: Traits
     rows: list[int] = field(default_factory=list)
     object_index: list[int] = field(default_factory=list)
     ids: list[int] = field(default_factory=list)
@@ -93,6 +111,9 @@ def build_batch(
         matrices=own[kept],
         object_index=np.array(placements.object_index, np.int32)[kept],
         ids=np.array(placements.ids, np.int64)[kept],
+        seen_by_camera=placements.traits.seen_by_camera,
+        casts_shadow=placements.traits.casts_shadow,
+        link_group=placements.traits.link_group.number,
     )
     hidden = np.array(placements.hidden, np.bool_)[kept]
     return (previous if previous is not None and same_batch(previous, batch) else batch), hidden

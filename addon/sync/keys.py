@@ -58,9 +58,12 @@ class MeshKeys:
         return f"{id_key('object', original)}.{count}", f"{original.name_full}{_SEPARATOR}{count:06d}"
 
 
-def batch_key(names: tuple[str, ...], mesh: str, materials: tuple[str, ...]) -> str:
-    """Key of the batch of a mesh with materials, given by key; `names` are those of the mesh and of each material."""
-    return _SEPARATOR.join((*names, mesh, *materials))
+def batch_key(names: tuple[str, ...], mesh: str, materials: tuple[str, ...], differences: tuple[str, ...]) -> str:
+    """Key of the batch of a mesh with materials, given by key; `names` are those of the mesh and of each material.
+
+    `differences` tell its instances from the usual ones of that mesh with those materials.
+    """
+    return _SEPARATOR.join((*names, mesh, *materials, *differences))
 
 
 def instance_key(instance: bpy.types.DepsgraphObjectInstance) -> str:

@@ -18,11 +18,17 @@ if TYPE_CHECKING:
 
 
 def read_light(
-    key: str, shown: bpy.types.Object, matrix: Float64Array, images: ImageTable, messages: Messages
+    key: str,
+    shown: bpy.types.Object,
+    placer: bpy.types.Object,
+    matrix: Float64Array,
+    images: ImageTable,
+    messages: Messages,
 ) -> Light | None:
-    """The light of an evaluated object or instance with world matrix `matrix` (4, 4).
+    """The light of an evaluated object, placed by itself or an instancer with world matrix `matrix` (4, 4).
 
-    None where the matrix is broken, and for Cycles' portals: they guide its sampling and do not shine.
+    Whatever is linked, it reaches all groups. None where the matrix is broken, and for Cycles' portals: they guide its
+    sampling and do not shine. Like Cycles, nothing here reads EEVEE's Custom Distance.
     """
     light: Any = shown.data
     if light.type == "AREA" and hasattr(light, "cycles") and light.cycles.is_portal:
@@ -42,9 +48,10 @@ def read_light(
         "key": key,
         "name": name,
         "world_from_light": rigid_matrix(matrix),
-        "diffuse_factor": light.diffuse_factor,
-        "specular_factor": light.specular_factor,
+        "diffuse_factor": light.diffuse_factor * (shown.visible_diffuse and placer.visible_diffuse),
+        "specular_factor": light.specular_factor * (shown.visible_glossy and placer.visible_glossy),
         "casts_shadow": light.use_shadow,
+        "shadow_texel": shadow_texel(light),
     }
     if light.type == "SUN":
         factor = sun_irradiance(light.angle, light.normalize)
@@ -65,6 +72,16 @@ def read_light(
             **common,
         )
     return Light(kind=LightKind.POINT, emission=emission, radius=radius, **common)
+
+
+def shadow_texel(light: Any) -> float:
+    """Metres that a shadow map's texel has at least; see `Light.shadow_texel`.
+
+    Blender's Resolution Limit is meant 1 m from the light where it is absolute, and anywhere for a sun. Relative, it
+    holds at each shadowed point, however far from the light, which no one texel of a map can keep: there is none then.
+    """
+    absolute = light.type == "SUN" or light.use_absolute_resolution
+    return light.shadow_maximum_resolution if absolute else 0.0
 
 
 def point_intensity(radius: float, normalize: bool) -> float:

@@ -12,13 +12,14 @@ from ..scene.arrays import BoolArray
 from .camera import camera_messages, render_camera
 from .changes import Messages, with_versions
 from .effects import effect_messages
-from .instances import Placements, build_batch, read_matrices, shown_instances
+from .instances import Placements, Traits, build_batch, read_matrices, shown_instances
 from .keys import MeshKeys, batch_key, id_key, instance_id, instance_key
 from .lights import read_light
+from .linking import LightLinks
 from .materials import MaterialTable, missing_attribute_messages
 from .meshes import MeshRecord, update_mesh
-from .visibility import Hidden, Visibility
-from .world import read_world
+from .visibility import Hidden, Placer, Visibility
+from .world import WorldTable
 
 if TYPE_CHECKING:
     import bpy
@@ -32,6 +33,8 @@ _UNSUPPORTED = {
 }
 _HAIR = "Particle hair is not rendered yet; left out on:"
 _NO_FACES = "These have no faces and are not seen:"
+_LIGHT_SEEN = "Lights are not shown to the camera yet; only what they light is seen of:"
+_EMITTER_LINKED = "Light linking of emissive surfaces is not rendered yet; these light everything:"
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,7 @@ class Mirror:
         self._scene = Scene()
         self._meshes: dict[str, MeshRecord] = {}
         self._materials = MaterialTable()
+        self._world = WorldTable()
 
     def sync(self, depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView3D | None = None) -> SyncResult:
         """Compare with `depsgraph` and return the scene as it is now; the same `Scene` where nothing changed.
@@ -71,7 +75,7 @@ class Mirror:
         self._meshes = gathering.meshes
         batches, hidden = gathering.batches({batch.key: batch for batch in self._scene.batches})
         blender_scene: Any = depsgraph.scene_eval
-        world = read_world(depsgraph, self._materials.images, messages)
+        world, suns = self._world.read(depsgraph, self._materials.images, messages)
         materials, images = self._materials.collect()
         camera_messages(depsgraph, messages)
         render = blender_scene.render
@@ -82,13 +86,13 @@ class Mirror:
             materials=materials,
             images=images,
             batches=batches,
-            lights=tuple(sorted(gathering.lights, key=lambda light: light.key)),
+            lights=(*gathering.lights(), *suns),
             world=world,
             camera=render_camera(depsgraph, max(width, 1), max(height, 1)),
         )
         missing_attribute_messages(scene, messages)
         if space is None:
-            effect_messages(depsgraph, scene, messages)
+            effect_messages(depsgraph, messages)
         self._scene = with_versions(scene, self._scene)
         return SyncResult(self._scene, messages.texts(), time.perf_counter() - start, hidden)
 
@@ -105,7 +109,7 @@ class _Gathering:
         messages: Messages,
     ) -> None:
         self.meshes: dict[str, MeshRecord] = {}
-        self.lights: list[Light] = []
+        self._lights: list[tuple[Light, Any]] = []
         self._hidden_lights: set[str] = set()
         self._depsgraph = depsgraph
         self._previous = previous
@@ -117,18 +121,19 @@ class _Gathering:
         self._frames_per_second = blender_scene.render.fps / blender_scene.render.fps_base
         self._visibility = Visibility(depsgraph, space, messages)
         self._matrices = read_matrices(depsgraph)
-        self._drawn: dict[tuple[int, int], tuple[Placements, int] | None] = {}
-        self._placements: dict[tuple[str, tuple[str, ...]], Placements] = {}
+        self._links = LightLinks(messages)
+        self._drawn: dict[tuple[int, int, int], tuple[Placements, int] | None] = {}
+        self._placements: dict[tuple[str, tuple[str, ...], Traits], Placements] = {}
         self._mesh_keys = MeshKeys()
 
     def run(self) -> None:
-        """Fill `meshes`, `lights` and the placements."""
+        """Fill `meshes`, the lights and the placements."""
         for row, instance, shown in shown_instances(self._depsgraph):
             kind = shown.type
             if kind == "MESH":
                 self._place(row, instance, shown)
             elif kind == "LIGHT":
-                self._add_light(row, instance_key(instance), shown)
+                self._add_light(row, instance, shown)
             elif kind in _UNSUPPORTED:
                 self._messages.add_named(_UNSUPPORTED[kind], shown.name)
 
@@ -144,28 +149,38 @@ class _Gathering:
                     hidden[batch.key] = rows
         return tuple(batches), Hidden(hidden, frozenset(self._hidden_lights))
 
-    def _add_light(self, row: int, key: str, shown: Any) -> None:
-        light = read_light(key, shown, self._matrices[row], self._materials.images, self._messages)
-        if light is not None:
-            self.lights.append(light)
-            if not self._visibility.shows(shown):
-                self._hidden_lights.add(key)
+    def lights(self) -> tuple[Light, ...]:
+        """The lights in the order of their keys, linked to the groups of all placements."""
+        linked = (self._links.linked(light, emitter) for light, emitter in self._lights)
+        return tuple(sorted(linked, key=lambda light: light.key))
+
+    def _add_light(self, row: int, instance: Any, shown: Any) -> None:
+        key = instance_key(instance)
+        placer = instance.parent if instance.is_instance else shown
+        light = read_light(key, shown, placer, self._matrices[row], self._materials.images, self._messages)
+        if light is None:
+            return
+        self._lights.append((light, shown.original))
+        if not self._visibility.shows(shown):
+            self._hidden_lights.add(key)
+        if self._depsgraph.mode == "RENDER" and shown.visible_camera and placer.visible_camera:
+            self._messages.add_named(_LIGHT_SEEN, shown.name)
 
     def _place(self, row: int, instance: Any, shown: Any) -> None:
         placer = self._visibility.placer(instance, shown)
-        if not placer.seen_by_camera:
-            return
-        identity = (shown.data.as_pointer(), shown.original.session_uid)
+        identity = (shown.data.as_pointer(), shown.original.session_uid, placer.uid)
         if identity not in self._drawn:
-            self._drawn[identity] = self._first(instance, shown)
+            self._drawn[identity] = self._first(instance, shown, placer)
         entry = self._drawn[identity]
         if entry is not None:
             placements, object_index = entry
             placements.add(row, object_index, instance_id(instance, placer.uid), hidden=not placer.shown_in_viewport)
 
-    def _first(self, instance: Any, shown: Any) -> tuple[Placements, int] | None:
-        """What all instances of one object with one mesh share; None where there is nothing to draw."""
-        if not shown.visible_camera:
+    def _first(self, instance: Any, shown: Any, placer: Placer) -> tuple[Placements, int] | None:
+        """What all placements of one object with one mesh by one placer share; None where there is nothing to draw."""
+        seen = shown.visible_camera and placer.seen_by_camera
+        casts_shadow = shown.visible_shadow and placer.casts_shadow
+        if not (seen or casts_shadow):
             return None
         if not instance.is_instance and _has_hair(shown):
             self._messages.add_named(_HAIR, shown.name)
@@ -175,7 +190,8 @@ class _Gathering:
                 self._messages.add_named(_NO_FACES, shown.name)
             return None
         slots, attribute = self._slot_materials(shown)
-        materials = tuple(material.key for material in slots)
+        if any(material.is_emissive for material in slots) and _is_linked_emitter(shown.original):
+            self._messages.add_named(_EMITTER_LINKED, shown.name)
         key, name = self._mesh_keys.key(shown)
         if key not in self.meshes:
             previous = self._previous.get(key)
@@ -183,12 +199,19 @@ class _Gathering:
             self._messages.extend(key, self.meshes[key].warnings)
         if not self.meshes[key].mesh.slots:
             return None
-        if (key, materials) not in self._placements:
-            names = (name, *(material.name for material in slots))
-            self._placements[key, materials] = Placements(batch_key(names, key, materials), key, materials)
-        placements = self._placements[key, materials]
+        placements = self._placements_of(key, name, slots, Traits(seen, casts_shadow, self._links.group(shown, placer)))
         placements.names.add(shown.name)
         return placements, shown.pass_index
+
+    def _placements_of(self, mesh: str, name: str, slots: tuple[Material, ...], traits: Traits) -> Placements:
+        """The placements of a mesh, by key and name, with the same materials and traits."""
+        materials = tuple(material.key for material in slots)
+        identity = (mesh, materials, traits)
+        if identity not in self._placements:
+            names = (name, *(material.name for material in slots))
+            key = batch_key(names, mesh, materials, traits.differences)
+            self._placements[identity] = Placements(key, mesh, materials, traits)
+        return self._placements[identity]
 
     def _slot_materials(self, shown: Any) -> tuple[tuple[Material, ...], str | None]:
         """The materials in an object's slots, and the colour attribute that the first of them reads."""
@@ -204,6 +227,11 @@ def _has_hair(shown: Any) -> bool:
     return any(
         system.settings.type == "HAIR" and system.settings.render_type == "PATH" for system in shown.particle_systems
     )
+
+
+def _is_linked_emitter(original: Any) -> bool:
+    linking = original.light_linking
+    return linking.receiver_collection is not None or linking.blocker_collection is not None
 
 
 def _is_instancer(shown: Any) -> bool:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 _HOLDOUT = "Holdouts are not rendered yet; shown as if they were none:"
 _SHADOW_CATCHER = "Shadow catchers are not rendered yet; shown as if they were none:"
-_INDIRECT_ONLY = "Indirect light is not rendered yet; left out, because nothing else shows them:"
+_INDIRECT_ONLY = "Indirect light is not rendered yet; only the shadows of these are seen:"
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,7 @@ class Placer(NamedTuple):
 
     uid: int
     seen_by_camera: bool
+    casts_shadow: bool
     shown_in_viewport: bool
 
 
@@ -50,7 +51,7 @@ class Visibility:
         return self._space is None or shown.visible_in_viewport_get(self._space)
 
     def placer(self, instance: Any, shown: Any) -> Placer:
-        """Who places the mesh `shown`. All meshes of one instancer are alike seen or not."""
+        """Who places the mesh `shown`, and what holds for all meshes that it places."""
         if not instance.is_instance:
             return self._read(shown, shown)
         instancer = instance.parent
@@ -71,7 +72,7 @@ class Visibility:
             self._messages.add_named(_HOLDOUT, owner.name)
         elif seen_by_camera and owner.is_shadow_catcher:
             self._messages.add_named(_SHADOW_CATCHER, owner.name)
-        return Placer(owner.original.session_uid, seen_by_camera, self.shows(shown))
+        return Placer(owner.original.session_uid, seen_by_camera, owner.visible_shadow, self.shows(shown))
 
 
 def _has_special_collections(collection: Any) -> bool:
@@ -112,5 +113,7 @@ def _shown_rows(batch: InstanceBatch, shown: BoolArray, previous: InstanceBatch 
 
 
 def same_batch(first: InstanceBatch, second: InstanceBatch) -> bool:
-    """Whether two batches with the same key place the same instances."""
-    return all(same_array(getattr(first, name), getattr(second, name)) for name in ("matrices", "object_index", "ids"))
+    """Whether two batches with the same key place the same instances in the same group."""
+    return first.link_group == second.link_group and all(
+        same_array(getattr(first, name), getattr(second, name)) for name in ("matrices", "object_index", "ids")
+    )

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import bpy
 
-from . import operators, panels, properties, standard_panels
+from . import data_panels, operators, panels, properties, standard_panels
 
-_CLASSES = (*operators.CLASSES, *panels.CLASSES)
+_CLASSES = (*operators.CLASSES, *panels.CLASSES, *data_panels.CLASSES)
 _PRESET_ROOT = str(Path(__file__).parent)
 
 

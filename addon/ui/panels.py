@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The engine's own panels."""
+"""The engine's own panels in the render, output and view layer tabs."""
 
 from typing import Any
 
@@ -22,7 +22,7 @@ CLOSED: Any = {"DEFAULT_CLOSED"}
 """Panels that start folded."""
 
 
-class _EnginePanel:
+class EnginePanel:
     """A panel of the Properties editor that only our engine shows."""
 
     bl_space_type = "PROPERTIES"
@@ -51,7 +51,7 @@ class DEEP_GBUFFER_PT_sampling_presets(PresetPanel, bpy.types.Panel):
     preset_add_operator = DEEP_GBUFFER_OT_sampling_preset_add.bl_idname
 
 
-class DEEP_GBUFFER_PT_sampling(_EnginePanel, bpy.types.Panel):
+class DEEP_GBUFFER_PT_sampling(EnginePanel, bpy.types.Panel):
     """Samples of the final render and of viewports."""
 
     bl_label = "Sampling"
@@ -71,6 +71,48 @@ class DEEP_GBUFFER_PT_sampling(_EnginePanel, bpy.types.Panel):
         column.prop(settings, "seed")
 
 
+class DEEP_GBUFFER_PT_sampling_lights(EnginePanel, bpy.types.Panel):
+    """How lights and world are sampled."""
+
+    bl_label = "Lights"
+    bl_parent_id = "DEEP_GBUFFER_PT_sampling"
+    bl_options = CLOSED
+
+    def draw(self, context: Any) -> None:
+        """What bounds the cost of many lights, and of the world."""
+        settings = context.scene.deep_gbuffer
+        column = self._column()
+        column.prop(settings, "light_threshold")
+        column.prop(settings, "world_directions")
+
+
+class DEEP_GBUFFER_PT_sampling_shadows(EnginePanel, bpy.types.Panel):
+    """Shadow maps."""
+
+    bl_label = "Shadows"
+    bl_parent_id = "DEEP_GBUFFER_PT_sampling"
+    bl_options = CLOSED
+
+    def draw(self, context: Any) -> None:
+        """Their size and memory, and how often they are drawn."""
+        settings = context.scene.deep_gbuffer
+        column = self._column()
+        column.prop(settings, "shadow_map_size", text="Map Size")
+        column.prop(settings, "shadow_memory", text="Pool Size")
+        column.prop(settings, "shadow_updates")
+
+
+class DEEP_GBUFFER_PT_shading(EnginePanel, bpy.types.Panel):
+    """How surfaces reflect direct light."""
+
+    bl_label = "Shading"
+    bl_options = CLOSED
+
+    def draw(self, context: Any) -> None:
+        """The model."""
+        self._column().prop(context.scene.deep_gbuffer, "shading_model", text="Model")
+
+
 class DEEP_GBUFFER_PT_layers_presets(PresetPanel, bpy.types.Panel):
     """Presets of the Deep G-Buffer panel."""
 
@@ -80,7 +122,7 @@ class DEEP_GBUFFER_PT_layers_presets(PresetPanel, bpy.types.Panel):
     preset_add_operator = DEEP_GBUFFER_OT_layers_preset_add.bl_idname
 
 
-class DEEP_GBUFFER_PT_layers(_EnginePanel, bpy.types.Panel):
+class DEEP_GBUFFER_PT_layers(EnginePanel, bpy.types.Panel):
     """The deep G-buffer itself."""
 
     bl_label = "Deep G-Buffer"
@@ -104,7 +146,7 @@ class DEEP_GBUFFER_PT_layers(_EnginePanel, bpy.types.Panel):
             column.label(text="Only layer output and debug views read them yet", icon="INFO")
 
 
-class DEEP_GBUFFER_PT_guard_band(_EnginePanel, bpy.types.Panel):
+class DEEP_GBUFFER_PT_guard_band(EnginePanel, bpy.types.Panel):
     """What is rendered past the picture's edge."""
 
     bl_label = "Guard Band"
@@ -138,7 +180,7 @@ def _reads_past_the_edge(settings: Any) -> bool:
     return settings.layers > 1 and reads_past_the_edge(Variant(settings.variant))
 
 
-class DEEP_GBUFFER_PT_film(_EnginePanel, bpy.types.Panel):
+class DEEP_GBUFFER_PT_film(EnginePanel, bpy.types.Panel):
     """Pixel filter and background."""
 
     bl_label = "Film"
@@ -151,7 +193,7 @@ class DEEP_GBUFFER_PT_film(_EnginePanel, bpy.types.Panel):
         column.prop(context.scene.render, "film_transparent", text="Transparent")
 
 
-class DEEP_GBUFFER_PT_debug_view(_EnginePanel, bpy.types.Panel):
+class DEEP_GBUFFER_PT_debug_view(EnginePanel, bpy.types.Panel):
     """One channel of the deep G-buffer instead of the picture."""
 
     bl_label = "Debug View"
@@ -167,7 +209,7 @@ class DEEP_GBUFFER_PT_debug_view(_EnginePanel, bpy.types.Panel):
         layer.prop(settings, "debug_layer")
 
 
-class DEEP_GBUFFER_PT_layer_output(_EnginePanel, bpy.types.Panel):
+class DEEP_GBUFFER_PT_layer_output(EnginePanel, bpy.types.Panel):
     """Files with every layer."""
 
     bl_label = "Layer Output"
@@ -192,7 +234,7 @@ class DEEP_GBUFFER_PT_layer_output(_EnginePanel, bpy.types.Panel):
         path.prop(settings, "layers_path", text="Path")
 
 
-class DEEP_GBUFFER_PT_view_layer_passes(_EnginePanel, bpy.types.Panel):
+class DEEP_GBUFFER_PT_view_layer_passes(EnginePanel, bpy.types.Panel):
     """The passes that the engine delivers."""
 
     bl_label = "Passes"
@@ -206,7 +248,7 @@ class DEEP_GBUFFER_PT_view_layer_passes(_EnginePanel, bpy.types.Panel):
                 column.prop(context.view_layer, item.flag, text=item.names[-1])
 
 
-class DEEP_GBUFFER_PT_statistics(_EnginePanel, bpy.types.Panel):
+class DEEP_GBUFFER_PT_statistics(EnginePanel, bpy.types.Panel):
     """What the last final render did and cost."""
 
     bl_label = "Statistics"
@@ -250,6 +292,9 @@ def _table(layout: Any, title: str, rows: list[tuple[str, str]]) -> None:
 CLASSES = (
     DEEP_GBUFFER_PT_sampling_presets,
     DEEP_GBUFFER_PT_sampling,
+    DEEP_GBUFFER_PT_sampling_lights,
+    DEEP_GBUFFER_PT_sampling_shadows,
+    DEEP_GBUFFER_PT_shading,
     DEEP_GBUFFER_PT_layers_presets,
     DEEP_GBUFFER_PT_layers,
     DEEP_GBUFFER_PT_guard_band,

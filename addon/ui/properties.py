@@ -8,7 +8,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 
 from ..engine import viewport
 from ..engine.settings import GuardBandUnit, SeparationUnit
-from ..scene import DebugView, Variant
+from ..scene import DebugView, ShadingModel, Variant
 from ..scene.settings import MAXIMUM_LAYERS
 
 _SCENE: Any = bpy.types.Scene  # takes properties that its type does not name
@@ -82,6 +82,35 @@ SEPARATION_ITEMS = [
         "Relative to Depth",
         "A fraction of the distance from the camera, for scenes that reach from near to far",
     ),
+]
+SHADING_ITEMS = [
+    (
+        ShadingModel.PHYSICAL.value,
+        "Physically Based",
+        "Surfaces reflect light as the Principled BSDF does in Cycles",
+    ),
+    (
+        ShadingModel.PHONG.value,
+        "Phong",
+        "A preview: plain diffuse reflection and a Blinn-Phong highlight, for each pixel; does not look like Cycles",
+    ),
+    (
+        ShadingModel.GOURAUD.value,
+        "Gouraud",
+        "A preview: as Phong, but for each vertex and blended in between; highlights show the mesh's triangles",
+    ),
+]
+SHADOW_MAP_SIZE_ITEMS = [
+    (str(2**power), f"{2**power} px", f"At most {2**power} x {2**power} pixels for one shadow map")
+    for power in range(8, 14)
+]
+SHADOW_MEMORY_ITEMS = [
+    (
+        str(2**power),
+        f"{2**power} MB" if power < 10 else f"{2 ** (power - 10)} GB",
+        f"Keep at most {2**power} MB of them",
+    )
+    for power in range(4, 13)
 ]
 GUARD_BAND_ITEMS = [
     (GuardBandUnit.PIXELS.value, "Pixels", "The same number of pixels whatever the picture's size"),
@@ -208,6 +237,60 @@ class DeepGBufferSettings(bpy.types.PropertyGroup):
         soft_max=10.0,
         max=50.0,
         subtype="PERCENTAGE",
+        update=_changed,
+    )
+    shading_model: EnumProperty(
+        name="Shading",
+        description="How surfaces reflect the light that reaches them directly. Phong and Gouraud are previews",
+        items=SHADING_ITEMS,
+        default=ShadingModel.PHYSICAL.value,
+        update=_changed,
+    )
+    light_threshold: FloatProperty(
+        name="Light Threshold",
+        description="With many lights, one that adds less than this to a white surface is sampled only now and then: "
+        "higher values are faster and noisier, in the mean nothing is lost; 0 samples every light always",
+        default=0.01,
+        min=0.0,
+        soft_max=1.0,
+        precision=3,
+        update=_changed,
+    )
+    world_directions: IntProperty(
+        name="World Directions",
+        description="From how many directions the world lights each sample, brighter ones being likelier: more give "
+        "less noise under a sky, and take longer",
+        default=4,
+        min=1,
+        soft_max=16,
+        max=64,
+        update=_changed,
+    )
+    shadow_map_size: EnumProperty(
+        name="Shadow Map Size",
+        description="Pixels of the largest shadow maps on each side: more give sharper shadows of fine things. Each "
+        "map is only as large as what the view shows of its shadows",
+        items=SHADOW_MAP_SIZE_ITEMS,
+        default="2048",
+        update=_changed,
+    )
+    shadow_memory: EnumProperty(
+        name="Shadow Pool Size",
+        description="Graphics memory for shadow maps: with more, more lights keep theirs while nothing moves; with "
+        "less, maps are smaller",
+        items=SHADOW_MEMORY_ITEMS,
+        default="512",
+        update=_changed,
+    )
+    shadow_updates: IntProperty(
+        name="Lights per Sample",
+        description="How many lights get new shadow maps, seen from another point of theirs, in each sample; with more "
+        "lights, the rest keep theirs until it is their turn. Lower values are faster and take more samples to "
+        "become as soft",
+        default=16,
+        min=1,
+        soft_max=64,
+        max=1024,
         update=_changed,
     )
     debug_view: EnumProperty(

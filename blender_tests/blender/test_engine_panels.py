@@ -3,9 +3,11 @@
 
 from types import SimpleNamespace
 
+import addon_utils
 import bpy
 import pytest
 
+from addon.ui import data_panels
 from addon.ui.panels import (
     CLASSES,
     DEEP_GBUFFER_PT_guard_band,
@@ -53,14 +55,14 @@ class Layout:
         assert hasattr(getattr(bpy.ops, category), function)
 
 
-def drawn(panel):
-    """What the panel and its header show."""
+def drawn(panel, context=None):
+    """What the panel and its header show; in Blender's own context unless told otherwise."""
     whole = Layout()
     for draw in (getattr(panel, "draw_header", None), panel.draw):
         if draw is not None:
             stand_in = SimpleNamespace(layout=Layout(whole))
             stand_in._column = lambda panel=panel, stand_in=stand_in: panel._column(stand_in)
-            draw(stand_in, bpy.context)
+            draw(stand_in, context or bpy.context)
     return whole
 
 
@@ -131,6 +133,64 @@ def test_options_of_files_that_are_not_written_are_gray(plane_scene):
     assert drawn(DEEP_GBUFFER_PT_layer_output).gray == {"save_motion"}
     ours.save_deep, ours.save_layers = False, True
     assert not drawn(DEEP_GBUFFER_PT_layer_output).gray
+
+
+def showing(**data):
+    """A context that shows some data in the Properties editor of our engine."""
+    return SimpleNamespace(
+        **{"engine": "DEEP_GBUFFER", **dict.fromkeys(("object", "light", "material", "world")), **data}
+    )
+
+
+@pytest.mark.parametrize("panel", data_panels.CLASSES)
+def test_panels_of_data_show_where_there_is_some_and_the_engine_is_ours(registered, panel):
+    material = bpy.data.materials.new("Paint")
+    lamp = bpy.data.lights.new("Lamp", "POINT")
+    data = {"object": bpy.data.objects.new("Lamp", lamp), "light": lamp, "material": material}
+    full = showing(**data, world=bpy.data.worlds.new("World"))
+    assert panel.poll(full)
+    assert not panel.poll(SimpleNamespace(**{**vars(full), "engine": "CYCLES"}))
+    assert not panel.poll(showing())
+    assert drawn(panel, full).properties
+    assert hasattr(bpy.types, getattr(panel, "bl_parent_id", panel.__name__))
+
+
+def test_settings_of_cycles_are_shown_as_long_as_there_are_any(registered):
+    context = showing(material=bpy.data.materials.new("Paint"), world=bpy.data.worlds.new("World"))
+    panels = data_panels.DEEP_GBUFFER_PT_material_settings, data_panels.DEEP_GBUFFER_PT_world_ray_visibility
+    addon_utils.disable("cycles")
+    try:
+        assert not any(panel.poll(context) for panel in panels)
+    finally:
+        addon_utils.enable("cycles")
+    assert all(panel.poll(context) for panel in panels)
+
+
+def test_each_kind_of_object_shows_the_rays_that_are_read_of_it(registered):
+    def shown(data, instance_type="NONE"):
+        item = bpy.data.objects.new("Thing", data)
+        item.instance_type = instance_type
+        context = showing(object=item)
+        panel = data_panels.DEEP_GBUFFER_PT_object_ray_visibility
+        return drawn(panel, context).properties if panel.poll(context) else []
+
+    assert shown(bpy.data.meshes.new("M")) == ["visible_camera", "visible_shadow"]
+    assert shown(bpy.data.lights.new("L", "SUN")) == ["visible_diffuse", "visible_glossy"]
+    assert shown(None) == shown(bpy.data.cameras.new("C")) == []
+    assert len(shown(None, "COLLECTION")) == 4
+
+
+def test_a_limit_of_shadow_maps_that_is_not_kept_is_gray(registered):
+    panel = data_panels.DEEP_GBUFFER_PT_light_shadow
+    limit = "shadow_maximum_resolution"
+    lamp, sun = bpy.data.lights.new("Lamp", "POINT"), bpy.data.lights.new("Sun", "SUN")
+    assert drawn(panel, showing(light=lamp)).gray == {limit}
+    lamp.use_absolute_resolution = True
+    assert not drawn(panel, showing(light=lamp)).gray
+    assert drawn(panel, showing(light=sun)).properties == ["use_shadow", limit]
+    assert not drawn(panel, showing(light=sun)).gray
+    sun.use_shadow = False
+    assert drawn(panel, showing(light=sun)).gray == {limit}
 
 
 def test_statistics_show_times_passes_reasons_and_memory(plane_scene):

@@ -11,12 +11,20 @@ import bpy
 import pytest
 
 import addon
-from addon.engine import sessions, viewport
+from addon.engine import sessions, settings, viewport
 from addon.engine.statistics import ENGINE
-from addon.scene import DebugView, Variant
+from addon.scene import DebugView, RenderSettings, ShadingModel, Variant
 from blender_tests.blender.engine_fixtures import plane_scene_fixture, registered_fixture  # noqa: F401 - fixtures
 
 PRESETS = ("deep_gbuffer/sampling", "deep_gbuffer/layers")
+LIGHT_SETTINGS = (
+    "shading_model",
+    "shadow_map_size",
+    "shadow_memory",
+    "shadow_updates",
+    "world_directions",
+    "light_threshold",
+)
 IN_ALL_VERSIONS = (
     "RENDER_PT_format",
     "RENDER_PT_output",
@@ -26,8 +34,11 @@ IN_ALL_VERSIONS = (
     "EEVEE_WORLD_PT_surface",
     "WORLD_PT_context_world",
     "DATA_PT_EEVEE_light",
+    "DATA_PT_EEVEE_light_influence",
     "DATA_PT_spot",
     "DATA_PT_lens",
+    "OBJECT_PT_shading",
+    "OBJECT_PT_visibility",
     "VIEWLAYER_PT_layer",
 )
 
@@ -88,6 +99,13 @@ def test_blenders_own_panels_show(registered, name):
     assert ENGINE in getattr(bpy.types, name).COMPAT_ENGINES
 
 
+@pytest.mark.parametrize("name", ["OBJECT_PT_light_linking", "OBJECT_PT_shadow_linking"])
+def test_linking_of_lights_shows_wherever_its_parent_does(registered, name):
+    panel = getattr(bpy.types, name)
+    assert panel.bl_parent_id == "OBJECT_PT_shading"
+    assert not hasattr(panel, "COMPAT_ENGINES")
+
+
 def test_panels_whose_settings_we_do_not_read_stay_away(registered):
     shown = {panel.__name__ for panel in panels() if ENGINE in panel.COMPAT_ENGINES}
     assert not {name for name in shown if "freestyle" in name.lower() or "eevee_raytracing" in name}
@@ -103,7 +121,7 @@ def test_a_process_that_forgets_to_unregister_ends(registered):
 def test_every_property_tells_what_it_is(registered):
     settings = bpy.context.scene.deep_gbuffer
     own = [item for item in settings.bl_rna.properties if item.identifier not in {"rna_type", "name"}]
-    assert len(own) == 21
+    assert len(own) == 27
     for item in own:
         assert len(item.description) > 15, item.identifier
         assert not item.description.endswith("."), item.identifier
@@ -121,6 +139,10 @@ def test_every_variant_and_every_debug_view_can_be_chosen(registered):
     properties = bpy.context.scene.deep_gbuffer.bl_rna.properties
     assert [item.identifier for item in properties["variant"].enum_items] == list(Variant)
     assert [item.identifier for item in properties["debug_view"].enum_items] == list(DebugView)
+    assert [item.identifier for item in properties["shading_model"].enum_items] == list(ShadingModel)
+    assert [int(item.identifier) for item in properties["shadow_map_size"].enum_items] == [
+        2**power for power in range(8, 14)
+    ]
 
 
 def test_defaults(registered, plane_scene):
@@ -131,6 +153,9 @@ def test_defaults(registered, plane_scene):
     assert (fresh.use_guard_band, fresh.guard_band_unit, fresh.guard_band_pixels) == (False, "PIXELS", 64)
     assert fresh.guard_band_percent == 3.0
     assert (fresh.save_motion, fresh.save_exit) == (False, False)
+    how, default = settings.viewport(plane_scene, 8, 8), RenderSettings(8, 8)
+    for name in LIGHT_SETTINGS:
+        assert getattr(how, name) == pytest.approx(getattr(default, name)), name
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@
 import pytest
 
 from addon.engine import settings
-from addon.scene import Variant
+from addon.scene import ShadingModel, Variant
 from blender_tests.blender.engine_fixtures import plane_scene_fixture, registered_fixture  # noqa: F401 - fixtures
 
 
@@ -38,6 +38,15 @@ def test_the_guard_band_in_pixels(plane_scene, used, unit, expected, size):
     ours.use_guard_band, ours.guard_band_unit = used, unit
     ours.guard_band_pixels, ours.guard_band_percent = 12, 12.5
     assert all(how.guard_band == expected for how in both(plane_scene, *size))
+
+
+def test_settings_of_lights_and_shadows_hold_in_renders_and_viewports(plane_scene):
+    ours = plane_scene.deep_gbuffer
+    ours.shading_model, ours.shadow_map_size, ours.shadow_memory = "GOURAUD", "512", "1024"
+    ours.shadow_updates, ours.world_directions, ours.light_threshold = 3, 7, 0.25
+    for how in both(plane_scene):
+        assert (how.shading_model, how.shadow_map_size, how.shadow_memory) == (ShadingModel.GOURAUD, 512, 1024)
+        assert (how.shadow_updates, how.world_directions, how.light_threshold) == (3, 7, 0.25)
 
 
 @pytest.mark.parametrize(

@@ -23,15 +23,11 @@ def ask_for_motion_blur(scene: bpy.types.Scene) -> None:
     scene.render.use_motion_blur = True
 
 
-def ask_for_lamp_shadows(scene: bpy.types.Scene) -> None:
+def ask_for_lights_seen(scene: bpy.types.Scene) -> None:
     for name in ("One", "Two"):
         light = bpy.data.objects.new(name, bpy.data.lights.new(name, "POINT"))
+        light.visible_camera = True
         scene.collection.objects.link(light)
-
-
-def ask_for_world_shadows(scene: bpy.types.Scene) -> None:
-    scene.world = bpy.data.worlds.new("Bright")
-    scene.world.color = (0.5, 0.5, 0.5)
 
 
 @pytest.mark.parametrize(
@@ -39,12 +35,11 @@ def ask_for_world_shadows(scene: bpy.types.Scene) -> None:
     [
         (ask_for_depth_of_field, "depth of field, which is not rendered yet"),
         (ask_for_motion_blur, "Motion blur is not rendered yet"),
-        (ask_for_lamp_shadows, "Shadows are not rendered yet"),
-        (ask_for_world_shadows, "Shadows are not rendered yet"),
+        (ask_for_lights_seen, "Lights are not shown to the camera yet; only what they light is seen of: “One”, “Two”."),
     ],
 )
 def test_an_effect_is_told_once_and_only_by_final_renders(plane_scene, ask, text):
-    bpy.data.lights["Sun"].use_shadow = False
+    assert not bpy.data.objects["Sun"].visible_camera
     assert rendered_warnings(plane_scene) == []
     ask(plane_scene)
     warnings = rendered_warnings(plane_scene)

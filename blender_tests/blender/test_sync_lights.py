@@ -10,6 +10,7 @@ from mathutils import Euler
 from sync_scenes import link, make_material, node_tree, only_light, sync
 
 from addon.scene import AreaShape, Light, LightKind
+from addon.sync.changes import same_fields
 
 HEIGHT = 2.0
 
@@ -94,6 +95,50 @@ def test_other_properties(empty_scene):
     light = only_light(sync().scene)
     assert (light.kind, light.casts_shadow, light.diffuse_factor) == (LightKind.SPOT, False, 0.5)
     np.testing.assert_allclose((light.angle, light.blend, light.radius), (1.1, 0.3, 0.2), rtol=1e-6)
+
+
+@pytest.mark.parametrize("instanced", [False, True], ids=["lamp", "instancer"])
+@pytest.mark.parametrize(
+    ("attribute", "factors"),
+    [("visible_diffuse", (0.0, 0.75)), ("visible_glossy", (0.5, 0.0))],
+    ids=["diffuse", "glossy"],
+)
+def test_rays_that_miss_a_light_get_nothing_from_it(empty_scene, attribute, factors, instanced):
+    lamp = add_light("POINT", diffuse_factor=0.5, specular_factor=0.75)
+    owner = placed_by_instancer(lamp) if instanced else lamp
+    light = only_light(sync().scene)
+    assert (light.diffuse_factor, light.specular_factor) == (0.5, 0.75)
+    setattr(owner, attribute, False)
+    light = only_light(sync().scene)
+    assert (light.diffuse_factor, light.specular_factor) == factors
+
+
+def placed_by_instancer(lamp: bpy.types.Object) -> bpy.types.Object:
+    """An empty that instances a lamp which is nowhere else in the scene."""
+    collection = bpy.data.collections.new("Lamps")
+    collection.objects.link(lamp)
+    bpy.context.scene.collection.objects.unlink(lamp)
+    empty = link("Placer", None)
+    empty.instance_type, empty.instance_collection = "COLLECTION", collection
+    return empty
+
+
+@pytest.mark.parametrize(
+    ("kind", "absolute", "texel"),
+    [("SUN", False, 0.25), ("POINT", True, 0.25), ("AREA", True, 0.25), ("SPOT", False, 0.0)],
+)
+def test_a_resolution_limit_at_a_fixed_distance_limits_shadow_maps(empty_scene, kind, absolute, texel):
+    lamp = add_light(kind, shadow_maximum_resolution=0.25)
+    if kind != "SUN":
+        lamp.data.use_absolute_resolution = absolute
+    assert only_light(sync().scene).shadow_texel == texel
+
+
+def test_eevees_custom_distance_changes_nothing(empty_scene):
+    lamp = add_light("POINT", energy=10.0)
+    before = only_light(sync().scene)
+    lamp.data.use_custom_distance, lamp.data.cutoff_distance = True, 0.1
+    assert same_fields(only_light(sync().scene), before)
 
 
 def irradiance_below(light: Light) -> np.ndarray:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Node graphs become Principled constants and a texture; what cannot is told with material and node."""
 
+import addon_utils
 import bpy
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from sync_scenes import (
     textured,
 )
 
-from addon.scene import BaseColorSource, Material
+from addon.scene import BaseColorSource, EmissionSampling, Material
 from addon.sync import Mirror
 from addon.sync.changes import Messages
 from addon.sync.materials import missing_attribute_messages
@@ -41,6 +42,9 @@ F0_15 = 0.04
             {"emission": (4.0, 2.0, 1.0)},
         ),
         ("ShaderNodeBsdfDiffuse", {"Color": (0.1, 0.2, 0.3, 1)}, {"base_color": (0.1, 0.2, 0.3), "specular": 0.0}),
+        ("ShaderNodeBsdfDiffuse", {"Roughness": 0.25}, {"diffuse_roughness": 0.25}),
+        ("ShaderNodeBsdfDiffuse", {"Roughness": 2.0}, {"diffuse_roughness": 1.0}),
+        ("ShaderNodeBsdfPrincipled", {"Diffuse_Roughness": 0.75}, {"diffuse_roughness": 0.75, "roughness": 0.5}),
         (
             "ShaderNodeBsdfAnisotropic",
             {"Color": (0.1, 0.2, 0.3, 1), "Roughness": 0.25},
@@ -95,6 +99,38 @@ def test_mix_shader_averages(empty_scene):
     mirrored, _, texts = mirrored_material(material)
     assert mirrored.base_color == pytest.approx((0.75, 0, 0.25))
     assert texts == ()
+
+
+@pytest.mark.parametrize(("roughness", "told"), [(0.0, False), (0.5, True)])
+def test_mixed_diffuse_roughness_is_averaged_and_told(empty_scene, roughness, told):
+    material, first = make_material("Mix", "ShaderNodeBsdfDiffuse", Roughness=roughness)
+    second, mix = add(material, "ShaderNodeBsdfDiffuse"), add(material, "ShaderNodeMixShader")
+    mix.inputs[0].default_value = 0.25
+    connect(material, first.outputs[0], mix.inputs[1])
+    connect(material, second.outputs[0], mix.inputs[2])
+    connect(material, mix.outputs[0], material.node_tree.nodes["Material Output"].inputs[0])
+    mirrored, _, texts = mirrored_material(material)
+    assert mirrored.diffuse_roughness == pytest.approx(0.75 * roughness)
+    assert any("averages" in text for text in texts) == told
+
+
+@pytest.mark.parametrize("sampling", list(EmissionSampling))
+def test_emission_sampling_is_cycles(empty_scene, sampling):
+    material, _ = make_material("Glow", "ShaderNodeEmission")
+    assert material.cycles.emission_sampling == EmissionSampling.AUTO
+    material.cycles.emission_sampling = sampling.value
+    assert mirrored_material(material)[0].emission_sampling is sampling
+
+
+def test_without_cycles_emission_is_sampled_where_it_is_worth_it(empty_scene):
+    material, _ = make_material("Glow", "ShaderNodeEmission")
+    material.cycles.emission_sampling = "NONE"
+    addon_utils.disable("cycles")
+    try:
+        assert not hasattr(material, "cycles")
+        assert mirrored_material(material)[0].emission_sampling is EmissionSampling.AUTO
+    finally:
+        addon_utils.enable("cycles")
 
 
 @pytest.mark.parametrize(("shader", "expected"), [("ShaderNodeBsdfTransparent", 0.7), ("ShaderNodeEmission", 1.0)])

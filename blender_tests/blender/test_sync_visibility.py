@@ -4,15 +4,22 @@
 import bpy
 import numpy as np
 import pytest
-from sync_scenes import assert_texts, depsgraph, link, make_object, node_tree, sync
+from sync_scenes import assert_texts, depsgraph, link, make_image, make_object, node_tree, sync, textured
 
 from addon.scene import Scene
 from addon.sync import Mirror, without_hidden
 
 
 def shown_names(scene: Scene) -> list[str]:
-    """Names of the meshes that are placed, once for each placement."""
-    return sorted(scene.meshes[batch.mesh].name for batch in scene.batches for _ in range(batch.count))
+    """Names of the meshes that cameras see, once for each placement."""
+    seen = (batch for batch in scene.batches if batch.seen_by_camera)
+    return sorted(scene.meshes[batch.mesh].name for batch in seen for _ in range(batch.count))
+
+
+def casting_names(scene: Scene) -> list[str]:
+    """Names of the meshes that cast shadows, once for each placement."""
+    casting = (batch for batch in scene.batches if batch.casts_shadow)
+    return sorted(scene.meshes[batch.mesh].name for batch in casting for _ in range(batch.count))
 
 
 def instance_collection(name: str, *objects: bpy.types.Object) -> bpy.types.Object:
@@ -26,21 +33,73 @@ def instance_collection(name: str, *objects: bpy.types.Object) -> bpy.types.Obje
     return empty
 
 
-def test_what_cameras_do_not_see_is_left_out(empty_scene):
+def test_what_cameras_do_not_see_still_casts_shadows(empty_scene):
     make_object("Seen")
     make_object("Unseen").visible_camera = False
-    assert shown_names(sync().scene) == ["Seen"]
+    result = sync()
+    assert (shown_names(result.scene), casting_names(result.scene)) == (["Seen"], ["Seen", "Unseen"])
+    assert result.warnings == ()
 
 
-def test_instances_of_and_by_what_cameras_do_not_see_are_left_out(empty_scene):
+def test_what_casts_no_shadow_is_still_seen(empty_scene):
+    make_object("Casting")
+    make_object("Seen").visible_shadow = False
+    scene = sync().scene
+    assert (shown_names(scene), casting_names(scene)) == (["Casting", "Seen"], ["Casting"])
+
+
+def test_what_is_neither_seen_nor_casts_shadows_is_left_out(empty_scene):
+    thing = make_object("Nothing")
+    thing.visible_camera = thing.visible_shadow = False
+    scene = sync().scene
+    assert (scene.batches, len(scene.meshes)) == ((), 0)
+
+
+@pytest.mark.parametrize(
+    ("attribute", "names"),
+    [("visible_camera", shown_names), ("visible_shadow", casting_names)],
+    ids=["seen", "casting"],
+)
+def test_an_instance_is_what_both_it_and_its_instancer_are(empty_scene, attribute, names):
     first, second = make_object("First"), make_object("Second")
-    first.visible_camera = False
+    setattr(first, attribute, False)
     placer = instance_collection("Both", first, second)
     other = link("Other", None)
     other.instance_type, other.instance_collection = "COLLECTION", placer.instance_collection
-    assert shown_names(sync().scene) == ["Second", "Second"]
-    placer.visible_camera = False
-    assert shown_names(sync().scene) == ["Second"]
+    assert names(sync().scene) == ["Second", "Second"]
+    setattr(placer, attribute, False)
+    assert names(sync().scene) == ["Second"]
+
+
+def test_objects_of_one_mesh_are_a_batch_for_each_way_in_which_they_are_there(empty_scene):
+    usual = make_object("Thing")
+    unseen, shadowless, usual_too = (link(name, usual.data) for name in ("Unseen", "Shadowless", "Usual"))
+    unseen.visible_camera, shadowless.visible_shadow = False, False
+    mirror = Mirror()
+    before = sync(mirror).scene
+    found = {(batch.seen_by_camera, batch.casts_shadow): batch for batch in before.batches}
+    assert {traits: batch.count for traits, batch in found.items()} == {
+        (True, True): 2,
+        (False, True): 1,
+        (True, False): 1,
+    }
+    assert len({batch.key for batch in before.batches}) == 3
+    usual_too.visible_shadow = False
+    after = sync(mirror).scene
+    assert {batch.key for batch in after.batches} == {batch.key for batch in before.batches}
+    assert after.versions.transforms != before.versions.transforms
+    assert after.versions.geometry == before.versions.geometry
+    kept = [batch for batch in after.batches if batch is found[batch.seen_by_camera, batch.casts_shadow]]
+    assert [batch.seen_by_camera for batch in kept] == [False]
+
+
+def test_what_an_unseen_surface_would_show_is_not_told(empty_scene):
+    material, _, _ = textured(make_image())
+    thing = make_object("Unseen")
+    thing.data.materials.append(material)
+    assert_texts(sync().warnings, "no UV map")
+    thing.visible_camera = False
+    assert sync().warnings == ()
 
 
 @pytest.mark.parametrize("instanced", [False, True], ids=["object", "instancer"])
@@ -73,11 +132,12 @@ def test_holdout_collections_are_told(empty_scene):
     assert_texts(sync().warnings, "Holdouts", "“Thing”")
 
 
-def test_indirect_only_collections_are_left_out_and_told(empty_scene):
+def test_indirect_only_collections_cast_shadows_and_are_told(empty_scene):
+    """In Cycles too, they are only missing from what cameras see directly."""
     make_object("Seen")
     in_collection(make_object("Lighting")).indirect_only = True
     result = sync()
-    assert shown_names(result.scene) == ["Seen"]
+    assert (shown_names(result.scene), casting_names(result.scene)) == (["Seen"], ["Lighting", "Seen"])
     assert_texts(result.warnings, "Indirect light", "“Lighting”")
 
 

@@ -245,6 +245,22 @@ def test_what_did_not_change_is_kept(with_pool):
     assert guarded[0] is not first[0]
 
 
+def test_a_texel_of_a_divided_target_is_for_several_pixels(with_pool):
+    """A picture of 5×3 pixels with a guard band of 2 covers 9×7: with 4×4 pixels a texel, 3×2 of them."""
+    specs = (TargetSpec("tiles", 2, "f4", 3, divisor=4), TargetSpec("few", 4, "u4", 1, guarded=False, divisor=4))
+
+    def job(pool, _):
+        pool.prepare(SIZE, specs, guard_band=2, depth_layers=1)
+        assert pool.margin("tiles") == pool.margin("few") == 0
+        sizes = pool.texture("tiles").size, pool.texture("few").size, len(pool.read("tiles"))
+        return sizes, pool.bytes(), pool.guard_band_bytes()
+
+    sizes, sizes_bytes, guard_band_bytes = with_pool(job)
+    assert sizes == ((3, 2, 3), (2, 1, 1), 8 * 3 * 3 * 2)
+    assert sizes_bytes == {"tiles": 8 * 3 * 3 * 2, "few": 16 * 2, "gbuffer.depth": DEPTH_BYTES * 9 * 7}
+    assert guard_band_bytes == 8 * 3 * (3 * 2 - 2 * 1) + DEPTH_BYTES * (9 * 7 - 5 * 3)
+
+
 def test_a_guard_band_over_the_limit_is_named(with_pool):
     def job(pool, device):
         limit = device.maximum_size

@@ -204,6 +204,14 @@ def test_what_is_not_seen_does_not_count():
         assert pixel_drift(frame(**there, mesh=still), frame(**moved, mesh=still), WIDTH, HEIGHT) == 0.0
 
 
+def test_what_only_casts_shadows_does_not_count():
+    first, second = (frame(x) for x in (0.0, 0.25))
+    assert pixel_drift(first, second, WIDTH, HEIGHT) > 0.0
+    unseen = [replace(batch, seen_by_camera=False) for batch in second.scene.batches]
+    second = replace(second, scene=replace(second.scene, batches=tuple(unseen)))
+    assert pixel_drift(first, second, WIDTH, HEIGHT) == 0.0
+
+
 def test_the_largest_answer_where_there_is_no_other():
     view = builders.camera()
     assert pixel_drift(frame(), frame(camera=replace(view, orthographic=True)), WIDTH, HEIGHT) == LARGEST_DRIFT

@@ -72,6 +72,15 @@ def test_the_middle_is_that_of_everything_that_is_placed():
     assert cut(camera((0.0, 0.0, 0.0)), camera((200.0, 0.0, 0.0)), scene)
 
 
+def test_the_middle_is_that_of_what_cameras_see():
+    mesh = builders.quad("q")
+    near = builders.batch("q", [builders.translation(z=-10.0)])
+    unseen = replace(builders.batch("q", [builders.translation(z=-900.0)], key="unseen"), seen_by_camera=False)
+    before, now = camera((0.0, 0.0, 0.0)), camera((8.0, 0.0, 0.0))
+    assert cut(before, now, builders.scene(mesh, batches=(near, unseen)))
+    assert not cut(before, now, builders.scene(mesh, batches=(near, replace(unseen, seen_by_camera=True))))
+
+
 def test_an_orthographic_view_pans_by_half_a_window_without_a_cut():
     window = (-4, 4, -2, 2)
     before = camera(window=window, orthographic=True)
@@ -156,6 +165,13 @@ def test_holes_change_the_population():
     assert not same_population(leaves(), leaves(materials=(closest,)))
     mesh = builders.quad("q")
     assert not same_population(leaves(), leaves(mesh=replace(mesh, uvs=mesh.uvs * 2)))
+
+
+def test_what_only_casts_shadows_is_nobody():
+    scene = population()
+    unseen = replace(builders.batch("q", key="unseen"), seen_by_camera=False)
+    assert same_population(scene, replace(scene, batches=(*scene.batches, unseen)))
+    assert not same_population(scene, replace(scene, batches=(replace(scene.batches[0], seen_by_camera=False),)))
 
 
 def test_an_empty_batch_is_nobody():

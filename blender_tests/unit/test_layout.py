@@ -7,9 +7,9 @@ from addon.render.layout import CHANNELS, DEPTH_BYTES, EXIT_CHANNELS, outputs_gl
 from tooling import readme_tables
 
 
-def test_a_layer_takes_no_more_than_48_bytes_per_pixel():
+def test_a_layer_takes_no_more_than_48_bytes_per_texel():
     channels = CHANNELS + EXIT_CHANNELS
-    assert sum(channel.target(1).bytes_per_pixel for channel in channels) + DEPTH_BYTES <= 48
+    assert sum(channel.target(1).bytes_per_texel for channel in channels) + DEPTH_BYTES <= 48
 
 
 def test_every_channel_has_a_target_of_its_own():

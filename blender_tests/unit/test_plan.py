@@ -24,7 +24,7 @@ def layers_written(planned):
 
 
 def test_a_lit_scene_needs_every_pass():
-    assert names(plan(LIT, SETTINGS)) == ["gbuffer", "direct", "composite"]
+    assert names(plan(LIT, SETTINGS)) == ["gbuffer", "depth_tiles", "direct", "composite"]
 
 
 def test_layers_nobody_reads_are_left_out_with_the_reason():
@@ -69,6 +69,22 @@ def test_emission_and_world_are_compiled_only_where_there_are_any():
     planned = plan(lamp, SETTINGS)
     assert planned.find("direct").defines == {"EMISSION"}
     assert "gbuffer normal" in reasons(planned)
+
+
+@pytest.mark.parametrize(
+    ("lights", "world", "wanted"),
+    [
+        ((builders.light(),), (0.0, 0.0, 0.0), True),
+        ((builders.light(casts_shadow=False),), (0.0, 0.0, 0.0), False),
+        ((builders.light(casts_shadow=False),), (0.0, 0.1, 0.0), True),
+        ((builders.light(casts_shadow=False),) * 16, (0.0, 0.0, 0.0), False),
+        ((builders.light(casts_shadow=False),) * 17, (0.0, 0.0, 0.0), True),
+    ],
+)
+def test_tiles_have_depth_ranges_for_shadow_maps_and_for_many_lights(lights, world, wanted):
+    planned = plan(builders.scene(builders.quad("q"), lights=lights, world=world), SETTINGS)
+    assert ("depth_tiles" in names(planned)) == wanted
+    assert wanted or "no light casts a shadow" in reasons(planned)["depth_tiles"]
 
 
 @pytest.mark.parametrize(
@@ -120,7 +136,7 @@ def test_motion_and_exit_surfaces_are_built_for_whoever_reads_them():
     assert reasons(planned)["exit"].startswith("no effect, output or debug view")
     assert layers_written(plan(LIT, replace(everything, motion_vectors=True)))["gbuffer.motion"] == 4
     planned = plan(LIT, replace(everything, exit_surfaces=True))
-    assert names(planned) == ["gbuffer", "exit", "direct", "composite"]
+    assert names(planned) == ["gbuffer", "exit", "depth_tiles", "direct", "composite"]
     assert layers_written(planned)["exit.view_depth"] == 4
     shown = plan(LIT, replace(SETTINGS, debug_view=DebugView.EXIT_ALBEDO, debug_layer=1))
     assert names(shown) == ["gbuffer", "exit", "composite"]
@@ -155,7 +171,7 @@ def test_nothing_looks_ahead_of_the_last_picture():
 @pytest.mark.parametrize("variant", ONE_PASS)
 def test_a_single_layer_has_no_variant(variant):
     planned = plan(LIT, replace(SETTINGS, variant=variant))
-    assert names(planned) == ["gbuffer", "direct", "composite"]
+    assert names(planned) == ["gbuffer", "depth_tiles", "direct", "composite"]
     assert reasons(planned)["oracle"] == "only one layer is built"
     assert not planned.one_pass
 

@@ -8,7 +8,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from addon.scene import BaseColorSource, Image, ImageTexture, Versions, snapshot
+from addon.scene import (
+    ALL_GROUPS,
+    BaseColorSource,
+    EmissionSampling,
+    EnvironmentMap,
+    Image,
+    ImageTexture,
+    Versions,
+    World,
+    snapshot,
+)
 from addon.scene.correspondence import Correspondence
 from addon.scene.versions import new_version
 from blender_tests import builders
@@ -50,6 +60,11 @@ def test_a_scene_comes_back_as_it_was(tmp_path_factory, positions, name, pixels)
         lights=(builders.light(radius=0.1),),
         images=(Image("i", name, 3, pixels, srgb=True),),
     )
+    world = World((1.0, 2.0, 3.0), EnvironmentMap("e", name, 4, positions[None]), np.eye(3), seen_by_glossy=False)
+    hidden = replace(scene.batches[0], seen_by_camera=False, casts_shadow=False, link_group=63)
+    linked = replace(scene.lights[0], receiver_groups=ALL_GROUPS - 1, blocker_groups=1, shadow_texel=0.1)
+    rough = replace(textured, diffuse_roughness=0.3, emission_sampling=EmissionSampling.FRONT)
+    scene = replace(scene, batches=(hidden,), lights=(linked,), materials={"white": rough}, world=world)
     scene = replace(scene, camera=builders.camera(), versions=Versions(1, 2, 3, 4, 5, 6))
     before = replace(scene, batches=(replace(scene.batches[0], version=7, matrices=2.0 * scene.batches[0].matrices),))
     snapshot.save(path, scene, before, replace(before, camera=None))
@@ -93,6 +108,15 @@ def test_what_frames_share_comes_back_shared_and_what_they_do_not_apart(tmp_path
     correspondence = Correspondence(previous)
     assert correspondence.positions(scene.meshes["moving"]) is previous.meshes["moving"].positions
     assert correspondence.matrices(scene.batches[1]) is scene.batches[1].matrices
+
+
+def test_an_environment_comes_back_shared_with_a_version_of_this_process(tmp_path):
+    environment = EnvironmentMap("e", "e", 7, np.ones((2, 4, 3), np.float32))
+    scene = replace(builders.scene(), world=World((1.0, 1.0, 1.0), environment))
+    snapshot.save(tmp_path / "scene.npz", scene, replace(scene, camera=builders.camera()))
+    first, second = (snapshot.load(tmp_path / "scene.npz") for _ in range(2))
+    assert first.scene.world.environment is first.previous.world.environment
+    assert first.scene.world.environment.version != second.scene.world.environment.version
 
 
 def test_shared_arrays_are_stored_once(tmp_path):

@@ -1,72 +1,174 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Lambert and GGX in the metallic/roughness parametrisation of Blender's Principled BSDF.
+// Reflection in the metallic/roughness parametrisation of Blender's Principled BSDF, as Cycles evaluates it:
+// a GGX metal, or a GGX dielectric over a diffuse surface that gets what the dielectric lets through.
 
 #include "common/constants.glsl"
 
 // Cycles clamps roughness alike; below it the highlight of a light sample is narrower than float32 resolves.
 const float SMALLEST_ALPHA = 1e-3;
+// √F0 above which a dielectric's index of refraction is no longer followed; 0.98 of the light is reflected there.
+const float LARGEST_ROOT = 0.99;
 
-// (roughness, n·v) -> scale and bias of F0 and F90 in the directional albedo; render/ggx_albedo.py integrates it.
-uniform sampler2D ggx_albedo_table;
+#ifdef SPECULAR
+// (roughness, n·v, √F0) -> parts of the directional albedo; render/ggx_albedo.py integrates it.
+uniform sampler3D ggx_albedo_table;
 
-/** Scale of F0 and bias for F90; the table's nodes are the centres of its texels. */
-vec2 lookup_ggx_albedo(float roughness, float n_dot_v)
+struct GgxAlbedo
 {
-    vec2 size = vec2(textureSize(ggx_albedo_table, 0));
-    return textureLod(ggx_albedo_table, (vec2(roughness, n_dot_v) * (size - 1.0) + 0.5) / size, 0.0).rg;
+    float single;           // share reflected by scattering once, where every reflection is complete
+    float schlick;          // what of it Schlick's weight (1 - cosθ)⁵ takes
+    float dielectric;       // mean place of a dielectric's reflectance between F0 and 1
+    float mean;             // `single`, averaged over the hemisphere
+};
+
+/** The table's nodes are the centres of its texels. `root`: √F0. */
+GgxAlbedo lookup_ggx_albedo(float roughness, float n_dot_v, float root)
+{
+    vec3 size = vec3(textureSize(ggx_albedo_table, 0));
+    vec4 entry = textureLod(ggx_albedo_table, (vec3(roughness, n_dot_v, root) * (size - 1.0) + 0.5) / size, 0.0);
+    return GgxAlbedo(entry.r, entry.g, entry.b, entry.a);
 }
+#endif
 
 struct Surface
 {
-    vec3 diffuse_albedo;    // share of incident light that leaves diffusely
+    vec3 diffuse_albedo;    // share of incident light that leaves diffusely, for a Lambertian surface
     vec3 specular_albedo;   // share that is reflected specularly, for unit light from everywhere
-    vec3 specular_f0;       // reflectance at normal incidence
-    vec3 multiple_scattering; // factor that returns what single scattering between microfacets loses
+    vec3 specular_f0;       // reflectance at normal incidence, 0 without specular reflection
+    vec3 metal_f0;
+    vec3 metal_factor;      // share of metal, times what returns the light that single scattering loses
+    float ior;              // of the dielectric
+    float dielectric_factor;
     float alpha;            // GGX roughness, the square of the perceptual one
+#ifdef DIFFUSE_ROUGHNESS
+    float diffuse_roughness;
+    vec3 diffuse_multiple;  // albedo of the light that leaves a rough diffuse surface after scattering on it repeatedly
+#endif
 };
 
-/** Reflectance at grazing incidence: 1, but nothing where there is no specular layer at all. */
-vec3 grazing_reflectance(vec3 f0)
+/** Unpolarised reflectance of a smooth dielectric for light from air. */
+float dielectric_fresnel(float cosine, float ior)
 {
-    return clamp(50.0 * f0, 0.0, 1.0);
+    float c = max(cosine, 1e-6);
+    float g = sqrt(ior * ior - 1.0 + c * c);
+    float across = (c - g) / (c + g);
+    float along = (ior * ior * c - g) / (ior * ior * c + g);
+    return 0.5 * (across * across + along * along);
+}
+
+/** Schlick's approximation (1994) of a metal's reflectance. */
+vec3 metal_fresnel(float cosine, vec3 f0)
+{
+    return mix(f0, vec3(1.0), pow(1.0 - clamp(cosine, 0.0, 1.0), 5.0));
+}
+
+#ifdef SPECULAR
+/**
+ * Factor on single-scattering GGX for the light that is reflected repeatedly between microfacets.
+ *
+ * Turquin 2019, "Practical multiple scattering compensation for microfacet models", with the reflectance of Kulla and
+ * Conty 2017, "Revisiting Physically Based Shading at Imageworks". `reflectance`: hemispherical mean of Fresnel's.
+ */
+vec3 multiple_scattering_factor(vec3 reflectance, GgxAlbedo albedo)
+{
+    vec3 repeated = reflectance * albedo.mean / (1.0 - reflectance * (1.0 - albedo.mean));
+    return 1.0 + repeated * (1.0 - albedo.single) / albedo.single;
+}
+#endif
+
+/** Share of unit light from everywhere that Fujii's Oren-Nayar surface reflects by scattering once (EON, eq. 9). */
+float rough_diffuse_albedo(float cosine, float roughness)
+{
+    float c = clamp(cosine, 1e-4, 1.0);
+    float s = sqrt(1.0 - c * c);
+    float g = s * (acos(c) - s * c) + 2.0 / 3.0 * (s / c * (1.0 - s * s * s) - s);
+    return (1.0 + roughness * g / PI) / (1.0 + (0.5 - 2.0 / (3.0 * PI)) * roughness);
+}
+
+/** Hemispherical mean of `rough_diffuse_albedo` (EON, eq. 12). */
+float mean_rough_diffuse_albedo(float roughness)
+{
+    return (1.0 + (2.0 / 3.0 - 28.0 / (15.0 * PI)) * roughness) / (1.0 + (0.5 - 2.0 / (3.0 * PI)) * roughness);
 }
 
 /**
- * Factor on single-scattering GGX that makes a white metal reflect everything.
- * Turquin 2019, "Practical multiple scattering compensation for microfacet models", eq. 16; `albedo` from the table.
+ * The surface of a G-buffer texel. `f0`: the dielectric's reflectance at normal incidence, 0 where there is none;
+ * `roughness` perceptual; `diffuse_roughness` 0…1 of what lies below, read with DIFFUSE_ROUGHNESS only.
  */
-vec3 multiple_scattering_factor(vec3 f0, vec2 albedo)
+Surface make_surface(vec3 base_color, float f0, float metallic, float roughness, float diffuse_roughness, float n_dot_v)
 {
-    float single = albedo.x + albedo.y;
-    return 1.0 + f0 * (1.0 - single) / single;
-}
-
-/** Share of light from everywhere that GGX reflects, multiple scattering included. */
-vec3 directional_albedo(vec3 f0, vec2 albedo)
-{
-    return (f0 * albedo.x + grazing_reflectance(f0) * albedo.y) * multiple_scattering_factor(f0, albedo);
-}
-
-/** The surface of a G-buffer texel: what the dielectric layer reflects is taken from the diffuse one below it. */
-Surface make_surface(vec3 base_color, float f0, float metallic, float roughness, float n_dot_v)
-{
-#ifdef SPECULAR
-    vec2 albedo = lookup_ggx_albedo(roughness, n_dot_v);
     Surface surface;
-    surface.specular_f0 = mix(vec3(f0), base_color, metallic);
-    surface.diffuse_albedo = base_color * (1.0 - metallic) * (1.0 - directional_albedo(vec3(f0), albedo));
-    surface.specular_albedo = directional_albedo(surface.specular_f0, albedo);
-    surface.multiple_scattering = multiple_scattering_factor(surface.specular_f0, albedo);
+#ifdef SPECULAR
+    float root = min(sqrt(f0), LARGEST_ROOT);
+    float dielectric = f0 > 0.0 ? 1.0 - metallic : 0.0;
+    GgxAlbedo albedo = lookup_ggx_albedo(roughness, n_dot_v, root);
+    surface.ior = (1.0 + root) / (1.0 - root);
+    // Hemispherical mean of Fresnel's reflectance: of a dielectric by Kulla and Conty 2017, of Schlick's exactly.
+    float mean_reflectance = (surface.ior - 1.0) / (4.08567 + 1.00071 * surface.ior);
+    float scattering = multiple_scattering_factor(vec3(mean_reflectance), albedo).x;
+    float reflected = f0 > 0.0 ? mix(root * root, 1.0, albedo.dielectric) * albedo.single * scattering : 0.0;
+    surface.metal_f0 = base_color;
+    surface.metal_factor = metallic * multiple_scattering_factor(mix(base_color, vec3(1.0), 1.0 / 21.0), albedo);
+    surface.dielectric_factor = dielectric * scattering;
+    surface.specular_f0 = metallic * base_color + dielectric * f0;
+    surface.specular_albedo = mix(base_color * albedo.single, vec3(albedo.single), albedo.schlick / albedo.single)
+                                  * surface.metal_factor
+                              + (1.0 - metallic) * reflected;
+    surface.diffuse_albedo = base_color * (1.0 - metallic) * (1.0 - reflected);
     surface.alpha = max(roughness * roughness, SMALLEST_ALPHA);
-    return surface;
 #else
-    return Surface(base_color, vec3(0.0), vec3(0.0), vec3(1.0), 1.0);
+    surface.diffuse_albedo = base_color;
+    surface.specular_albedo = surface.specular_f0 = surface.metal_f0 = surface.metal_factor = vec3(0.0);
+    surface.ior = surface.alpha = 1.0;
+    surface.dielectric_factor = 0.0;
+#endif
+#ifdef DIFFUSE_ROUGHNESS
+    // Cycles takes the square of the colour where EON has the colour: what scatters repeatedly is more saturated.
+    float mean = mean_rough_diffuse_albedo(diffuse_roughness);
+    vec3 color = clamp(base_color, 0.0, 1.0);
+    surface.diffuse_roughness = diffuse_roughness;
+    surface.diffuse_multiple = surface.diffuse_albedo * color * color * mean / (1.0 - color * (1.0 - mean))
+                               * (1.0 - rough_diffuse_albedo(n_dot_v, diffuse_roughness))
+                               / max(1.0 - mean, FLOAT_EPSILON);
+#endif
+    return surface;
+}
+
+/** Share of unit light from everywhere that leaves diffusely. `n_dot_v`: of the view that the surface was made for. */
+vec3 diffuse_directional_albedo(Surface surface, float n_dot_v)
+{
+#ifdef DIFFUSE_ROUGHNESS
+    return surface.diffuse_albedo * rough_diffuse_albedo(n_dot_v, surface.diffuse_roughness)
+           + surface.diffuse_multiple * (1.0 - mean_rough_diffuse_albedo(surface.diffuse_roughness));
+#else
+    return surface.diffuse_albedo;
 #endif
 }
 
 /**
- * GGX BRDF times n·l: Walter et al. 2007 (distribution), Heitz 2014 eq. 99 (height-correlated masking and shadowing),
- * Schlick 1994 (Fresnel). All vectors unit length, away from the surface. Unit: 1/sr.
+ * Diffuse BRDF times n·l: Lambert's, or with DIFFUSE_ROUGHNESS the energy-preserving Oren-Nayar model of Portsmouth,
+ * Kutz and Hill 2024 ("EON", JCGT 14(1)) over Fujii's. All vectors unit length, away from the surface. Unit: 1/sr.
+ */
+vec3 diffuse_brdf_cosine(Surface surface, vec3 normal, vec3 view, vec3 light)
+{
+    float n_dot_l = max(dot(normal, light), 0.0);
+#ifdef DIFFUSE_ROUGHNESS
+    float roughness = surface.diffuse_roughness;
+    float n_dot_v = max(dot(normal, view), 0.0);
+    float s = dot(light, view) - n_dot_l * n_dot_v;
+    if (s > 0.0)
+        s /= max(max(n_dot_l, n_dot_v), FLOAT_EPSILON);
+    float once = (1.0 + roughness * s) / (1.0 + (0.5 - 2.0 / (3.0 * PI)) * roughness);
+    vec3 repeatedly = surface.diffuse_multiple * (1.0 - rough_diffuse_albedo(n_dot_l, roughness));
+    return (surface.diffuse_albedo * once + repeatedly) * (n_dot_l / PI);
+#else
+    return surface.diffuse_albedo * (n_dot_l / PI);
+#endif
+}
+
+/**
+ * GGX BRDF times n·l: Walter et al. 2007 (distribution), Heitz 2014 eq. 99 (height-correlated masking and shadowing).
+ * All vectors unit length, away from the surface. Unit: 1/sr.
  */
 vec3 specular_brdf_cosine(Surface surface, vec3 normal, vec3 view, vec3 light)
 {
@@ -76,13 +178,14 @@ vec3 specular_brdf_cosine(Surface surface, vec3 normal, vec3 view, vec3 light)
     vec3 halfway = normalize(view + light);
     float n_dot_v = max(dot(normal, view), 1e-4);
     float n_dot_h = clamp(dot(normal, halfway), 0.0, 1.0);
+    float l_dot_h = dot(light, halfway);
     float a2 = surface.alpha * surface.alpha;
     // (n·h)²(a² − 1) + 1, written so that it keeps its digits near n·h = 1.
     float denominator = (1.0 - n_dot_h) * (1.0 + n_dot_h) + a2 * n_dot_h * n_dot_h;
     float distribution = a2 / (PI * denominator * denominator);
     float masking = n_dot_l * sqrt(n_dot_v * n_dot_v * (1.0 - a2) + a2);
     float shadowing = n_dot_v * sqrt(n_dot_l * n_dot_l * (1.0 - a2) + a2);
-    float weight = pow(1.0 - clamp(dot(light, halfway), 0.0, 1.0), 5.0);
-    vec3 fresnel = mix(surface.specular_f0, grazing_reflectance(surface.specular_f0), weight);
-    return surface.multiple_scattering * fresnel * distribution * 0.5 / (masking + shadowing) * n_dot_l;
+    vec3 reflectance = surface.metal_factor * metal_fresnel(l_dot_h, surface.metal_f0)
+                       + surface.dielectric_factor * dielectric_fresnel(l_dot_h, surface.ior);
+    return reflectance * (distribution * 0.5 / (masking + shadowing) * n_dot_l);
 }

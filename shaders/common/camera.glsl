@@ -23,3 +23,10 @@ vec3 view_direction(vec2 pixel)
     vec3 ray = camera_orthographic != 0 ? vec3(0.0, 0.0, -1.0) : vec3(window_point(pixel), -1.0);
     return -normalize(mat3(world_from_camera) * ray);
 }
+
+/** Metres that a pixel covers at a view depth (m). */
+float pixel_width(float view_depth)
+{
+    vec2 pixel = abs(camera_window.yw - camera_window.xz) / camera_resolution;
+    return max(pixel.x, pixel.y) * (camera_orthographic != 0 ? 1.0 : view_depth);
+}

@@ -1,5 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Light samples. The table's rows are documented in render/light_table.py; positions are camera-relative.
+// Lights and the points at which a sample of the film samples them. The rows of light_table are documented in
+// render/light_table.py; positions are camera-relative. light_samples has three texels a light:
+// 0 the point: of area lights −1…1 along the half axes; of points, spots and suns in the unit ball, world axes; of
+//   emissive surfaces the position · how many shadow maps, −1 for the faces of a cube
+// 1 normal of an emissive surface there; of lamps the point's position · its first shadow map
+// 2 square of how far the light reaches in this sample, and in every sample, m²
 
 #include "common/constants.glsl"
 
@@ -7,16 +12,19 @@ const int LIGHT_POINT = 0;
 const int LIGHT_SUN = 1;
 const int LIGHT_SPOT = 2;
 const int LIGHT_AREA = 3;
+const int LIGHT_MESH = 4;
+const int LIGHT_WORLD = 5;
 const int SHAPE_ELLIPSE = 1;
 
 uniform sampler2D light_table;
+uniform sampler2D light_samples;
 
 struct Light
 {
     int kind;
     vec3 position;
     vec3 axis;              // unit, where it shines
-    float radius;           // m; of a sun: half angle, rad
+    float radius;           // m; of a sun: half angle, rad; of an emissive surface: area, m²
     vec3 emission;
     float cone_cosine;      // of a spot's half angle
     float cone_softness;    // width of its soft edge, in cosines
@@ -25,8 +33,17 @@ struct Light
     bool ellipse;
     float diffuse_factor;
     float specular_factor;
-    float spread_slope;     // of an area light; of a point or spot light: above 0 where it is a disk
-    float spread_norm;
+    float spread_slope;     // of an area light; point or spot: above 0 where it is a disk; surface: whether its front shines
+    float spread_norm;      // of an area light; of an emissive surface whether its back shines
+};
+
+/** Where a light is sampled, the same for all pixels. */
+struct LightPoint
+{
+    vec3 offset;
+    vec3 normal;            // of an emissive surface; of a lamp its sampled position
+    int shadow_count;
+    int shadow_first;
 };
 
 struct LightSample
@@ -35,9 +52,32 @@ struct LightSample
     vec3 weight;            // incident radiance over the probability density in solid angle: irradiance per n·l, W/m²
 };
 
+/** The first texel of a light in a table with so many texels a light. */
+ivec2 light_texel(int index, int texels)
+{
+    return ivec2(index % LIGHTS_PER_ROW * texels, index / LIGHTS_PER_ROW);
+}
+
+LightPoint fetch_light_point(int index)
+{
+    ivec2 first = light_texel(index, TEXELS_PER_SAMPLE);
+    vec4 point = texelFetch(light_samples, first, 0);
+    vec4 normal = texelFetch(light_samples, first + ivec2(1, 0), 0);
+    return LightPoint(point.xyz, normal.xyz, int(point.w), int(normal.w));
+}
+
+#ifdef LINKING
+/** Whether a light shines on instances of a link group. */
+bool lights_group(int index, int group)
+{
+    vec4 words = texelFetch(light_table, light_texel(index, TEXELS_PER_LIGHT) + ivec2(6, 0), 0);
+    return (int(words[group / 16]) >> (group % 16) & 1) != 0;
+}
+#endif
+
 Light fetch_light(int index)
 {
-    ivec2 first = ivec2(index % LIGHTS_PER_ROW * TEXELS_PER_LIGHT, index / LIGHTS_PER_ROW);
+    ivec2 first = light_texel(index, TEXELS_PER_LIGHT);
     vec4 row_0 = texelFetch(light_table, first + ivec2(0, 0), 0);
     vec4 row_1 = texelFetch(light_table, first + ivec2(1, 0), 0);
     vec4 row_2 = texelFetch(light_table, first + ivec2(2, 0), 0);
@@ -46,24 +86,6 @@ Light fetch_light(int index)
     vec4 row_5 = texelFetch(light_table, first + ivec2(5, 0), 0);
     return Light(int(row_0.w), row_0.xyz, row_1.xyz, row_1.w, row_2.rgb, row_2.w, row_3.w, row_3.xyz, row_4.xyz,
                  int(row_4.w) == SHAPE_ELLIPSE, row_5.x, row_5.y, row_5.z, row_5.w);
-}
-
-/** Whether other (u, v) give other samples. */
-bool is_extended(Light light)
-{
-    return light.kind == LIGHT_AREA || light.radius > 0.0;
-}
-
-/** Unit square -> unit disk, area preserving (Shirley and Chiu 1997). */
-vec2 sample_disk(vec2 u)
-{
-    vec2 p = 2.0 * u - 1.0;
-    if (p == vec2(0.0))
-        return p;
-    bool wide = abs(p.x) > abs(p.y);
-    float radius = wide ? p.x : p.y;
-    float angle = wide ? 0.25 * PI * p.y / p.x : 0.5 * PI - 0.25 * PI * p.x / p.y;
-    return radius * vec2(cos(angle), sin(angle));
 }
 
 /** Two unit vectors perpendicular to n (Duff et al. 2017, "Building an Orthonormal Basis, Revisited"). */
@@ -76,18 +98,23 @@ void orthonormal_basis(vec3 n, out vec3 tangent, out vec3 bitangent)
     bitangent = vec3(b, s + n.y * n.y * a, -n.y);
 }
 
-/** Direction uniform in solid angle within a cone about `axis` whose half angle has this squared sine. */
-vec3 sample_cone(vec3 axis, float sine_squared, vec2 u)
+/** The part of a vector across a unit axis. */
+vec3 across(vec3 axis, vec3 vector)
+{
+    return vector - axis * dot(axis, vector);
+}
+
+/**
+ * Direction uniform in solid angle within a cone about `axis` whose half angle has this squared sine, where `disk`, a
+ * vector across the axis, is uniform in the unit disk.
+ */
+vec3 sample_cone(vec3 axis, float sine_squared, vec3 disk)
 {
     float one_minus_cosine = sine_squared / (1.0 + sqrt(max(1.0 - sine_squared, 0.0)));
-    vec2 disk = sample_disk(u);
     float share = dot(disk, disk);
     float drop = share * one_minus_cosine;
     float sine = sqrt(max(drop * (2.0 - drop), 0.0));
-    vec2 around = share > 0.0 ? disk * (sine / sqrt(share)) : vec2(0.0);
-    vec3 tangent, bitangent;
-    orthonormal_basis(axis, tangent, bitangent);
-    return tangent * around.x + bitangent * around.y + axis * (1.0 - drop);
+    return (share > 0.0 ? disk * (sine / sqrt(share)) : vec3(0.0)) + axis * (1.0 - drop);
 }
 
 /** Solid angle of that cone over the solid angle projected onto its axis, π sin²; tends to 1 for a narrow cone. */
@@ -96,17 +123,17 @@ float cone_flattening(float sine_squared)
     return 2.0 / (1.0 + sqrt(max(1.0 - sine_squared, 0.0)));
 }
 
-LightSample sample_sun(Light light, vec2 u)
+LightSample sample_sun(Light light, vec3 offset)
 {
     float sine = sin(light.radius);
-    return LightSample(sample_cone(-light.axis, sine * sine, u), light.emission * cone_flattening(sine * sine));
+    return LightSample(sample_cone(-light.axis, sine * sine, across(light.axis, offset)),
+                       light.emission * cone_flattening(sine * sine));
 }
 
-LightSample sample_area(Light light, vec3 position, vec2 u)
+LightSample sample_area(Light light, vec3 position, vec3 offset)
 {
-    vec2 p = light.ellipse ? sample_disk(u) : 2.0 * u - 1.0;
     float area = length(light.half_x) * length(light.half_y) * (light.ellipse ? PI : 4.0);
-    vec3 to_light = light.position + p.x * light.half_x + p.y * light.half_y - position;
+    vec3 to_light = light.position + offset.x * light.half_x + offset.y * light.half_y - position;
     float distance_squared = dot(to_light, to_light);
     vec3 direction = to_light * inversesqrt(distance_squared);
     float cosine = -dot(direction, light.axis);
@@ -119,36 +146,53 @@ LightSample sample_area(Light light, vec3 position, vec2 u)
     return LightSample(direction, light.emission * (spread * area * cosine / distance_squared));
 }
 
-/** A disk of the light's radius that faces the surface (Blender's soft falloff): finite however near. */
-LightSample sample_facing_disk(Light light, vec3 to_light, float distance_squared, vec2 u)
+/** An emissive surface, sampled at a position (camera-relative) with unit normal, uniformly over its area. */
+LightSample sample_mesh(Light light, vec3 position, LightPoint point)
 {
-    vec2 p = light.radius * sample_disk(u);
-    float on_disk_squared = distance_squared + dot(p, p);
-    vec3 tangent, bitangent;
-    orthonormal_basis(to_light * inversesqrt(distance_squared), tangent, bitangent);
-    vec3 direction = (to_light + p.x * tangent + p.y * bitangent) * inversesqrt(on_disk_squared);
+    vec3 to_light = point.offset - position;
+    float distance_squared = dot(to_light, to_light);
+    if (!(distance_squared > 0.0))
+        return LightSample(point.normal, vec3(0.0));
+    vec3 direction = to_light * inversesqrt(distance_squared);
+    float cosine = -dot(direction, point.normal);
+    bool shines = cosine > 0.0 ? light.spread_slope > 0.0 : light.spread_norm > 0.0;
+    float weight = shines ? light.radius * abs(cosine) / distance_squared : 0.0;
+    return LightSample(direction, light.emission * weight);
+}
+
+/** A disk of the light's radius that faces the surface (Blender's soft falloff): finite however near. */
+LightSample sample_facing_disk(Light light, vec3 to_light, float distance_squared, vec3 offset)
+{
+    vec3 on_disk = light.radius * across(to_light * inversesqrt(distance_squared), offset);
+    float on_disk_squared = distance_squared + dot(on_disk, on_disk);
+    vec3 direction = (to_light + on_disk) * inversesqrt(on_disk_squared);
     return LightSample(direction, light.emission * (sqrt(distance_squared / on_disk_squared) / on_disk_squared));
 }
 
-LightSample sample_sphere(Light light, vec3 to_light, float distance_squared, vec2 u)
+LightSample sample_sphere(Light light, vec3 to_light, float distance_squared, vec3 offset)
 {
     float radius_squared = light.radius * light.radius;
     float sine_squared = min(radius_squared / distance_squared, 1.0);
-    vec3 direction = sample_cone(to_light * inversesqrt(distance_squared), sine_squared, u);
+    vec3 axis = to_light * inversesqrt(distance_squared);
+    vec3 direction = sample_cone(axis, sine_squared, across(axis, offset));
     return LightSample(direction,
                        light.emission * (cone_flattening(sine_squared) / max(distance_squared, radius_squared)));
 }
 
-/** Sample a light from `position` with (u, v) in [0, 1)². An unlit sample has weight 0. */
-LightSample sample_light(Light light, vec3 position, vec2 u)
+/** What a light sends to `position` from its sampled point. An unlit sample has weight 0. */
+LightSample sample_light(Light light, vec3 position, LightPoint point)
 {
-#ifdef SUN_LIGHTS
-    if (light.kind == LIGHT_SUN)
-        return sample_sun(light, u);
+#if defined(SUN_LIGHTS) || defined(WORLD_LIGHTS)
+    if (light.kind == LIGHT_SUN || light.kind == LIGHT_WORLD)
+        return sample_sun(light, point.offset);
 #endif
 #ifdef AREA_LIGHTS
     if (light.kind == LIGHT_AREA)
-        return sample_area(light, position, u);
+        return sample_area(light, position, point.offset);
+#endif
+#ifdef MESH_LIGHTS
+    if (light.kind == LIGHT_MESH)
+        return sample_mesh(light, position, point);
 #endif
     LightSample result = LightSample(-light.axis, vec3(0.0));
 #if defined(SPHERE_LIGHTS) || defined(DISK_LIGHTS)
@@ -158,13 +202,13 @@ LightSample sample_light(Light light, vec3 position, vec2 u)
         return result;
 #if defined(SPHERE_LIGHTS) && defined(DISK_LIGHTS)
     if (light.spread_slope > 0.0)
-        result = sample_facing_disk(light, to_light, distance_squared, u);
+        result = sample_facing_disk(light, to_light, distance_squared, point.offset);
     else
-        result = sample_sphere(light, to_light, distance_squared, u);
+        result = sample_sphere(light, to_light, distance_squared, point.offset);
 #elif defined(DISK_LIGHTS)
-    result = sample_facing_disk(light, to_light, distance_squared, u);
+    result = sample_facing_disk(light, to_light, distance_squared, point.offset);
 #else
-    result = sample_sphere(light, to_light, distance_squared, u);
+    result = sample_sphere(light, to_light, distance_squared, point.offset);
 #endif
 #ifdef SPOT_CONES
     if (light.kind == LIGHT_SPOT)
@@ -173,4 +217,18 @@ LightSample sample_light(Light light, vec3 position, vec2 u)
 #endif
 #endif
     return result;
+}
+
+/** Camera-relative position (m) that the shadow maps of a light are drawn from. */
+vec3 light_origin(Light light, LightPoint point)
+{
+    return light.kind == LIGHT_MESH ? point.offset : point.normal;
+}
+
+/** Radius (m) of a disk as large as a lamp; of a sun the tangent of its angular radius. */
+float light_radius(Light light)
+{
+    if (light.kind == LIGHT_AREA)
+        return sqrt(length(light.half_x) * length(light.half_y) * (light.ellipse ? 1.0 : 4.0 / PI));
+    return light.kind == LIGHT_SUN ? tan(light.radius) : light.radius;
 }

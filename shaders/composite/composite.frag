@@ -9,6 +9,10 @@
 #include "generated/CompositeUniforms.glsl"
 #include "generated/outputs.glsl"
 
+#ifdef ENVIRONMENT
+#include "common/environment.glsl"
+#endif
+
 uniform sampler2DArray view_depth_layers;
 uniform sampler2DArray normal_layers;
 uniform sampler2DArray base_color_layers;
@@ -20,6 +24,8 @@ uniform sampler2DArray exit_view_depth_layers;
 uniform sampler2DArray exit_normal_layers;
 uniform sampler2DArray exit_base_color_layers;
 uniform sampler2DArray radiance_layers;
+uniform sampler2DArray diffuse_layers;
+uniform sampler2DArray glossy_layers;
 
 // Motion of this many pixels is shown with half of the greatest saturation.
 const float MOTION_SCALE = 8.0;
@@ -73,26 +79,71 @@ vec3 shown_color(ivec3 texel, float view_depth)
 #endif
 }
 
+/** What the camera sees of the world through a pixel. */
+vec3 background_radiance(vec2 pixel)
+{
+#ifdef ENVIRONMENT
+    return environment_radiance(-view_direction(pixel)) * background.rgb;
+#else
+    return background.rgb;
+#endif
+}
+
+#if defined(FILM_DIFFUSE_COLOR) || defined(FILM_GLOSSY_COLOR)
+/** The surface of the nearest layer. */
+Surface surface_of(ivec3 texel, vec2 pixel)
+{
+    vec4 base_color = texelFetch(base_color_layers, texel, 0);
+    vec4 material = texelFetch(material_layers, texel, 0);
+    vec3 normal = decode_octahedral(texelFetch(normal_layers, texel, 0).rg);
+    float n_dot_v = clamp(dot(normal, view_direction(pixel)), 0.0, 1.0);
+    return make_surface(base_color.rgb, base_color.a, material.r, material.g, material.b, n_dot_v);
+}
+#endif
+
 void main()
 {
     vec2 pixel = gl_FragCoord.xy + float(guard_band);
     ivec3 shown = ivec3(pixel, shown_layer);
     float view_depth = texelFetch(view_depth_layers, shown, 0).r;
-    out_combined = isinf(view_depth) ? background : vec4(shown_color(shown, view_depth), 1.0);
+    if (isinf(view_depth))
+        out_combined = background.a > 0.0 ? vec4(background_radiance(pixel), background.a) : vec4(0.0);
+    else
+        out_combined = vec4(shown_color(shown, view_depth), 1.0);
 
-#if defined(FILM_NORMAL) || defined(FILM_DIFFUSE_COLOR)
     ivec3 first = ivec3(pixel, 0);
+#if defined(FILM_NORMAL) || defined(FILM_DIFFUSE_COLOR) || defined(FILM_GLOSSY_COLOR) || defined(FILM_ENVIRONMENT)
     bool covered = !isinf(texelFetch(view_depth_layers, first, 0).r);
-    vec3 normal = decode_octahedral(texelFetch(normal_layers, first, 0).rg);
 #endif
 #ifdef FILM_NORMAL
+    vec3 normal = decode_octahedral(texelFetch(normal_layers, first, 0).rg);
     out_normal = vec4(covered ? normal : vec3(0.0), 0.0);
 #endif
+#if defined(FILM_DIFFUSE_COLOR) || defined(FILM_GLOSSY_COLOR)
+    Surface surface = surface_of(first, pixel);
+#endif
 #ifdef FILM_DIFFUSE_COLOR
-    vec4 base_color = texelFetch(base_color_layers, first, 0);
-    vec2 material = texelFetch(material_layers, first, 0).rg;
-    float n_dot_v = clamp(dot(normal, view_direction(pixel)), 0.0, 1.0);
-    Surface surface = make_surface(base_color.rgb, base_color.a, material.r, material.g, n_dot_v);
     out_diffuse_color = vec4(covered ? surface.diffuse_albedo : vec3(0.0), 0.0);
+#endif
+#ifdef FILM_GLOSSY_COLOR
+    out_glossy_color = vec4(covered ? surface.specular_albedo : vec3(0.0), 0.0);
+#endif
+#ifdef FILM_DIFFUSE_DIRECT
+    out_diffuse_direct = vec4(0.0);
+#ifdef SPLIT
+    out_diffuse_direct = texelFetch(diffuse_layers, first, 0);
+#endif
+#endif
+#ifdef FILM_GLOSSY_DIRECT
+    out_glossy_direct = vec4(0.0);
+#ifdef SPLIT
+    out_glossy_direct = texelFetch(glossy_layers, first, 0);
+#endif
+#endif
+#ifdef FILM_EMISSION
+    out_emission = vec4(decode_shared_exponent(texelFetch(emission_layers, first, 0)), 0.0);
+#endif
+#ifdef FILM_ENVIRONMENT
+    out_environment = vec4(covered ? vec3(0.0) : background_radiance(pixel), 0.0);
 #endif
 }

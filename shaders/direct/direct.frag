@@ -1,17 +1,30 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Outgoing radiance of one layer: light from lamps (unshadowed) and the constant world, plus emission.
+// Outgoing radiance of one layer: what lamps, emissive surfaces and the world send to it past what is in between, and
+// what it emits itself. With PREVIEW lamps are shown whole, by closed forms and soft shadows; else by one point each.
 
 #include "common/bsdf.glsl"
 #include "common/camera.glsl"
 #include "common/finite.glsl"
 #include "common/hash.glsl"
-#include "common/lights.glsl"
 #include "common/octahedral.glsl"
 #include "common/shared_exponent.glsl"
 #include "generated/DirectUniforms.glsl"
 
-#if defined(SUN_LIGHTS) || defined(AREA_LIGHTS) || defined(SPHERE_LIGHTS) || defined(DISK_LIGHTS)
-#define LIGHTS
+#ifdef LIGHTS
+#include "common/lights.glsl"
+#ifdef PREVIEW
+#include "common/analytic_lights.glsl"
+#endif
+#ifdef SHADOWS
+#include "common/shadows.glsl"
+#endif
+#ifdef MANY_LIGHTS
+#include "common/light_reach.glsl"
+#include "common/light_tiles.glsl"
+#endif
+#endif
+#ifdef ENVIRONMENT
+#include "common/environment.glsl"
 #endif
 
 uniform sampler2DArray view_depth_layers;
@@ -25,33 +38,185 @@ uniform sampler2DArray emission_layers;
 #endif
 
 layout(location = 0) out vec4 out_radiance;
+#ifdef SPLIT
+layout(location = 1) out vec4 out_diffuse;
+layout(location = 2) out vec4 out_glossy;
+#endif
+
+// Surfaces are where they are drawn to this part of a pixel: vertices are snapped to such a grid.
+const float SURFACE_PRECISION = 1.0 / 128.0;
+
+/** Radiance that leaves by diffuse and by specular reflection. */
+struct Reflected
+{
+    vec3 diffuse;
+    vec3 glossy;
+};
+
+/** What is lit in a texel. */
+struct Shading
+{
+    Surface surface;
+    vec3 position;
+    vec3 normal;
+    vec3 view;
+    float precision_along_view; // m by which the position may be off
+    int link_group;
+    vec2 random;                // another in every pixel and sample
+};
 
 #ifdef LIGHTS
-/** Radiance towards the viewer that all lights cause. */
-vec3 lit_radiance(Surface surface, vec3 position, vec3 normal, vec3 view)
+#ifdef SPECULAR
+/** A light's point moved a little at random, by about the distance to its other samples' points. */
+LightPoint scattered(Light light, LightPoint point, vec2 random)
 {
-#ifdef SPECULAR
-    bool glossy = any(greaterThan(surface.specular_f0, vec3(0.0)));
-    // Highlights take another light sample in every pixel: shared ones would show as separate dots on glossy surfaces.
-    // Counted from the picture's corner, so that a guard band does not change the picture.
-    vec2 specular_sample = fract(light_sample + hash_to_unit(uvec2(ivec2(gl_FragCoord.xy) - guard_band)));
+    LightPoint moved = point;
+    vec2 offset = highlight_jitter * (2.0 * random - 1.0);
+    if (light.kind == LIGHT_AREA && !light.ellipse) {
+        vec2 place = point.offset.xy + offset;
+        moved.offset.xy = clamp(place, -2.0 - place, 2.0 - place); // folded back at the edges
+        return moved;
+    }
+    vec3 tangent = vec3(1.0, 0.0, 0.0), bitangent = vec3(0.0, 1.0, 0.0);
+    if (light.kind != LIGHT_AREA)
+        orthonormal_basis(light.axis, tangent, bitangent);
+    moved.offset += offset.x * tangent + offset.y * bitangent;
+    moved.offset /= max(length(moved.offset), 1.0);
+    return moved;
+}
 #endif
-    vec3 radiance = vec3(0.0);
-    for (int index = 0; index < light_count; ++index) {
-        Light light = fetch_light(index);
-        LightSample incident = sample_light(light, position, light_sample);
-        float cosine = max(dot(normal, incident.direction), 0.0);
-        radiance += surface.diffuse_albedo / PI * incident.weight * (cosine * light.diffuse_factor);
+
+#ifdef PREVIEW
+/** A lamp as a whole. */
+Reflected lit_by_lamp(Light light, LightPoint point, Shading shading)
+{
+    vec3 irradiance = analytic_irradiance(light, shading.position, shading.normal);
+    Reflected result = Reflected(shading.surface.diffuse_albedo / PI * irradiance * light.diffuse_factor, vec3(0.0));
 #ifdef SPECULAR
-        if (!glossy)
-            continue;
-        if (is_extended(light))
-            incident = sample_light(light, position, specular_sample);
-        radiance += specular_brdf_cosine(surface, normal, view, incident.direction) * incident.weight
+    result.glossy = analytic_specular(light, shading.surface, shading.position, shading.normal, shading.view)
                     * light.specular_factor;
 #endif
+#ifdef SHADOWS
+    if (point.shadow_count != 0) {
+        vec3 origin = light_origin(light, point);
+        bool distant = light.kind == LIGHT_SUN;
+        vec3 direction = distant ? -light.axis : normalize(origin - shading.position);
+        Receiver receiver = Receiver(shading.position, shading.normal, shading.precision_along_view);
+        float visibility = soft_visibility(point, origin, light_radius(light), receiver,
+                                           dot(shading.normal, direction), 2.0 * PI * shading.random.x);
+        result.diffuse *= visibility;
+        result.glossy *= visibility;
     }
-    return radiance;
+#endif
+    return result;
+}
+#endif
+
+/** A light by its sampled point. */
+Reflected lit_by_point(int index, Light light, LightPoint point, Shading shading)
+{
+    LightSample incident = sample_light(light, shading.position, point);
+    float n_dot_l = dot(shading.normal, incident.direction);
+    vec3 weight = incident.weight;
+#ifdef MANY_LIGHTS
+    vec3 to_light = light.position - shading.position;
+    weight *= light_reach_weight(index, dot(to_light, to_light));
+#endif
+#ifdef SHADOWS
+    if (point.shadow_count != 0) {
+        Receiver receiver = Receiver(shading.position, shading.normal, shading.precision_along_view);
+        weight *= point_visibility(point, light_origin(light, point), receiver, n_dot_l);
+    }
+#endif
+    Reflected result;
+    result.diffuse = diffuse_brdf_cosine(shading.surface, shading.normal, shading.view, incident.direction) * weight
+                     * light.diffuse_factor;
+    result.glossy = vec3(0.0);
+#ifdef SPECULAR
+    if (any(greaterThan(shading.surface.specular_f0, vec3(0.0)))
+        && !(light.kind == LIGHT_WORLD && shading.surface.alpha < smallest_world_alpha)) {
+        // Highlights take another point near the sampled one in every pixel: a shared one would show as a dot.
+        LightSample reflected = sample_light(light, shading.position, scattered(light, point, shading.random));
+        bool same = light.kind == LIGHT_MESH || light.kind == LIGHT_WORLD;
+        vec3 direction = same ? incident.direction : reflected.direction;
+        vec3 arriving = same || max(max(incident.weight.r, incident.weight.g), incident.weight.b) == 0.0
+                            ? weight
+                            : weight * (reflected.weight / max(incident.weight, vec3(1e-37)));
+        result.glossy = specular_brdf_cosine(shading.surface, shading.normal, shading.view, direction) * arriving
+                        * light.specular_factor;
+    }
+#endif
+    return result;
+}
+
+/** Adds what one light causes. */
+void add_light(int index, Shading shading, inout Reflected sum)
+{
+#ifdef LINKING
+    if (!lights_group(index, shading.link_group))
+        return;
+#endif
+    Light light = fetch_light(index);
+    LightPoint point = fetch_light_point(index);
+#if defined(PREVIEW) && defined(MESH_LIGHTS)
+    Reflected reflected;
+    if (light.kind == LIGHT_MESH)
+        reflected = lit_by_point(index, light, point, shading);
+    else
+        reflected = lit_by_lamp(light, point, shading);
+#elif defined(PREVIEW)
+    Reflected reflected = lit_by_lamp(light, point, shading);
+#else
+    Reflected reflected = lit_by_point(index, light, point, shading);
+#endif
+    sum.diffuse += reflected.diffuse;
+    sum.glossy += reflected.glossy;
+}
+
+/** What all lights cause. */
+Reflected lit(Shading shading)
+{
+    Reflected sum = Reflected(vec3(0.0), vec3(0.0));
+#ifdef MANY_LIGHTS
+    for (int page = 0; page < light_tile_pages; ++page) {
+        uvec4 words = light_tile_page(ivec2(gl_FragCoord.xy), layer, light_tile_pages, page);
+        for (int word = 0; word < 4; ++word)
+            for (uint left = words[word]; left != 0u; left &= left - 1u)
+                add_light(light_tile_index(page, word, left), shading, sum);
+    }
+#else
+    for (int index = 0; index < light_count; ++index)
+        add_light(index, shading, sum);
+#endif
+    return sum;
+}
+#endif
+
+#ifdef WORLD
+/** What the world causes where nothing is in between. */
+Reflected lit_by_world(Shading shading)
+{
+    vec3 mirrored = reflect(-shading.view, shading.normal);
+    Reflected result = Reflected(vec3(0.0), vec3(0.0));
+#ifdef ENVIRONMENT
+    result.glossy = environment_specular(mirrored, shading.surface.alpha);
+#ifdef PREVIEW
+    result.diffuse = environment_irradiance(shading.normal) / PI;
+#endif
+#else
+    result.glossy = world_radiance.rgb;
+#ifdef PREVIEW
+    result.diffuse = world_radiance.rgb;
+#endif
+#endif
+    result.diffuse *= shading.surface.diffuse_albedo * world_factors.x;
+    result.glossy *= shading.surface.specular_albedo * world_factors.y;
+#ifndef PREVIEW
+    // The world's sampled directions show in all but the smoothest reflections.
+    if (shading.surface.alpha >= smallest_world_alpha)
+        result.glossy = vec3(0.0);
+#endif
+    return result;
 }
 #endif
 
@@ -59,27 +224,42 @@ void main()
 {
     ivec3 texel = ivec3(gl_FragCoord.xy, layer);
     float view_depth = texelFetch(view_depth_layers, texel, 0).r;
-    if (isinf(view_depth)) {
-        out_radiance = vec4(0.0);
-        return;
-    }
-    vec3 radiance = vec3(0.0);
+    Reflected reflected = Reflected(vec3(0.0), vec3(0.0));
+    vec3 emitted = vec3(0.0);
+    bool covered = !isinf(view_depth);
+    if (covered) {
 #ifdef EMISSION
-    radiance += decode_shared_exponent(texelFetch(emission_layers, texel, 0));
+        emitted = decode_shared_exponent(texelFetch(emission_layers, texel, 0));
 #endif
 #if defined(LIGHTS) || defined(WORLD)
-    vec3 normal = decode_octahedral(texelFetch(normal_layers, texel, 0).rg);
-    vec4 base_color = texelFetch(base_color_layers, texel, 0);
-    vec2 material = texelFetch(material_layers, texel, 0).rg;
-    vec3 view = view_direction(gl_FragCoord.xy);
-    float n_dot_v = clamp(dot(normal, view), 0.0, 1.0);
-    Surface surface = make_surface(base_color.rgb, base_color.a, material.r, material.g, n_dot_v);
-#endif
+        Shading shading;
+        shading.normal = decode_octahedral(texelFetch(normal_layers, texel, 0).rg);
+        vec4 base_color = texelFetch(base_color_layers, texel, 0);
+        vec4 material = texelFetch(material_layers, texel, 0);
+        shading.view = view_direction(gl_FragCoord.xy);
+        float n_dot_v = clamp(dot(shading.normal, shading.view), 0.0, 1.0);
+        shading.surface =
+            make_surface(base_color.rgb, base_color.a, material.r, material.g, material.b, n_dot_v);
+        shading.position = relative_position(gl_FragCoord.xy, view_depth);
+        shading.precision_along_view = SURFACE_PRECISION * pixel_width(view_depth) / max(n_dot_v, 0.02);
+        shading.link_group = int(255.0 * material.a + 0.5);
+        // Counted from the picture's corner, so that a guard band does not change the picture.
+        uvec2 pixel = uvec2(ivec2(gl_FragCoord.xy) - guard_band);
+        shading.random = fract(hash_to_unit(pixel) + pixel_shift);
 #ifdef LIGHTS
-    radiance += lit_radiance(surface, relative_position(gl_FragCoord.xy, view_depth), normal, view);
+        reflected = lit(shading);
 #endif
 #ifdef WORLD
-    radiance += world_radiance.rgb * (surface.diffuse_albedo + surface.specular_albedo);
+        Reflected world = lit_by_world(shading);
+        reflected.diffuse += world.diffuse;
+        reflected.glossy += world.glossy;
 #endif
-    out_radiance = vec4(finite_radiance(radiance), 1.0);
+#endif
+    }
+    vec3 radiance = emitted + reflected.diffuse + reflected.glossy;
+    out_radiance = vec4(finite_radiance(radiance), covered ? 1.0 : 0.0);
+#ifdef SPLIT
+    out_diffuse = vec4(finite_radiance(reflected.diffuse), 1.0);
+    out_glossy = vec4(finite_radiance(reflected.glossy), 1.0);
+#endif
 }

@@ -175,7 +175,7 @@ void main()
     out_base_color = vec4(clamp(base_color, 0.0, 65504.0), material_base_color.a);
 #endif
 #ifdef WRITE_MATERIAL
-    out_material = material_surface.xy;
+    out_material = vec4(material_surface.xyz, float(surface.link_group) / 255.0);
 #endif
 #ifdef WRITE_EMISSION
     out_emission = encode_shared_exponent(finite_radiance(material_emission.rgb));

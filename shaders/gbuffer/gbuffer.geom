@@ -45,6 +45,9 @@ void copy_corner(int corner)
 #ifdef WRITE_OBJECT_INDEX
     surface.object_index = corners[corner].object_index;
 #endif
+#ifdef WRITE_MATERIAL
+    surface.link_group = corners[corner].link_group;
+#endif
 #ifdef PREVIOUS
     surface.clip = corners[corner].clip;
     surface.previous = corners[corner].previous;

@@ -11,6 +11,7 @@
 #endif
 #endif
 
+#include "gbuffer/pose.glsl"
 #include "gbuffer/surface.glsl"
 #include "generated/GBufferUniforms.glsl"
 
@@ -22,12 +23,8 @@ in vec2 in_uv;
 #ifdef ATTRIBUTE
 in vec4 in_color;
 #endif
-in vec4 in_row_0; // rows of world-from-object
-in vec4 in_row_1;
-in vec4 in_row_2;
-in vec3 in_translation_low; // what float32 loses of the fourth column
-#ifdef WRITE_OBJECT_INDEX
-in int in_object_index;
+#if defined(WRITE_OBJECT_INDEX) || defined(WRITE_MATERIAL)
+in int in_indices; // pass index; link group from bit 16 on
 #endif
 #ifdef PREVIOUS_POSE
 in vec3 in_previous_position;
@@ -53,15 +50,6 @@ out Ahead
 } ahead;
 #endif
 
-/** Rows of world-from-object with what float32 loses of the translation. */
-struct Pose
-{
-    vec4 row_0;
-    vec4 row_1;
-    vec4 row_2;
-    vec3 translation_low;
-};
-
 #if defined(PREVIOUS_POSE) || defined(NEXT_POSE)
 /** The pose of an instance from a texture with four texels each (`geometry.PoseTexture`). */
 Pose fetch_pose(sampler2D poses, int instance)
@@ -72,17 +60,6 @@ Pose fetch_pose(sampler2D poses, int instance)
                 texelFetch(poses, first + ivec2(2, 0), 0), texelFetch(poses, first + ivec2(3, 0), 0).xyz);
 }
 #endif
-
-/** Object-space position (m) to world axes with a camera's position, given as two float32 parts, as origin. */
-vec3 relative_to(vec3 camera_high, vec3 camera_low, Pose pose, vec3 position)
-{
-    // Part by part: the high parts cancel exactly where object and camera are near each other.
-    precise vec3 high = vec3(pose.row_0.w, pose.row_1.w, pose.row_2.w) - camera_high;
-    precise vec3 translation = high + (pose.translation_low - camera_low);
-    precise vec3 relative = vec3(dot(pose.row_0.xyz, position), dot(pose.row_1.xyz, position),
-                                 dot(pose.row_2.xyz, position)) + translation;
-    return relative;
-}
 
 void main()
 {
@@ -160,6 +137,9 @@ void main()
     surface.color = in_color.rgb;
 #endif
 #ifdef WRITE_OBJECT_INDEX
-    surface.object_index = uint(max(in_object_index, 0));
+    surface.object_index = uint(in_indices & 0xFFFF);
+#endif
+#ifdef WRITE_MATERIAL
+    surface.link_group = in_indices >> 16;
 #endif
 }

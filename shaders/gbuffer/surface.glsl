@@ -27,6 +27,12 @@
 #define SURFACE_OBJECT_INDEX
 #endif
 
+#ifdef WRITE_MATERIAL
+#define SURFACE_LINK_GROUP flat int link_group;
+#else
+#define SURFACE_LINK_GROUP
+#endif
+
 // Clip x, y, w of now, and clip x, y, w and view depth of the previous frame.
 #ifdef PREVIOUS
 #define SURFACE_PREVIOUS vec3 clip; vec4 previous;
@@ -34,5 +40,5 @@
 #define SURFACE_PREVIOUS
 #endif
 
-#define SURFACE_MATERIAL SURFACE_UV SURFACE_COLOR SURFACE_OBJECT_INDEX
+#define SURFACE_MATERIAL SURFACE_UV SURFACE_COLOR SURFACE_OBJECT_INDEX SURFACE_LINK_GROUP
 #define SURFACE float view_depth; flat int layer; SURFACE_FACING SURFACE_MATERIAL SURFACE_PREVIOUS

@@ -3,11 +3,23 @@
 
 from .base import Frame, Pass
 from .composite import CompositePass
+from .depth_tiles import DepthTilesPass
 from .direct import DirectPass
 from .exit import ExitPass
 from .gbuffer import GBufferPass
+from .light_tiles import LightTilesPass
 from .oracle import OraclePass
+from .shadow_maps import ShadowMapsPass
 
-PASSES: tuple[type[Pass], ...] = (OraclePass, GBufferPass, ExitPass, DirectPass, CompositePass)
+PASSES: tuple[type[Pass], ...] = (
+    OraclePass,
+    GBufferPass,
+    ExitPass,
+    DepthTilesPass,
+    ShadowMapsPass,
+    LightTilesPass,
+    DirectPass,
+    CompositePass,
+)
 
 __all__ = ["PASSES", "Frame", "Pass"]

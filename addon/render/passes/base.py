@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
+import moderngl
+
 from ...scene import Camera, Layering, Moment, RenderSettings, Scene
 from ...scene.correspondence import Correspondence
 from ...scene.drift import pixel_drift
@@ -13,12 +15,25 @@ from ..draws import DrawLists
 from ..film import Film
 from ..geometry import GeometryStore
 from ..images import ImageStore
+from ..lighting import Lighting
 from ..oracle_state import OracleState
 from ..plan import Plan, PlannedPass
 from ..programs import ProgramSpec
 from ..sampling import Sample
 from ..targets import TexturePool
 from ..uniforms import UniformBlock
+
+
+@dataclass(frozen=True)
+class ShadowTextures:
+    """The shadow maps of one sample: their pages (None: there is no map), and the table of what each is; how many were
+    `drawn` since the view began and how often one was there already; bytes of video memory."""
+
+    atlas: moderngl.TextureArray | None
+    table: moderngl.Texture
+    drawn: int
+    kept: int
+    bytes: int
 
 
 @dataclass
@@ -29,7 +44,7 @@ class Frame:
     `layering`: how one pass over the geometry reaches several layers. `oracle`: what its textures show.
     `previous`: the frame before. `history`: what a final render draws its oracle from, if not from the frame itself.
     `ahead`: the next picture as far as it is known or predicted, None where that is the next sample.
-    `continuous`: as in `Sequence`. `drift`: what `drift_since` found.
+    `continuous`: as in `Sequence`. `drift`: what `drift_since` found. `shadows`: this sample's maps, if it has any.
     """
 
     device: Device
@@ -39,6 +54,7 @@ class Frame:
     images: ImageStore
     film: Film
     oracle: OracleState
+    lighting: Lighting
     correspondence: Callable[[Scene], Correspondence]
     scene: Scene
     settings: RenderSettings
@@ -52,6 +68,7 @@ class Frame:
     ahead: Moment | None
     continuous: bool
     drift: float | None = None
+    shadows: ShadowTextures | None = None
 
     @property
     def moment(self) -> Moment:
@@ -75,6 +92,7 @@ class Frame:
     def begin_sample(self, sample: Sample) -> None:
         """Go on to a sample."""
         self.sample, self.camera = sample, self.jittered(self.view, sample)
+        self.lighting.begin_sample(sample.index)
 
 
 class Pass(Protocol):

@@ -2,6 +2,7 @@
 """The picture of one sample, added to the film: radiance over background, or a debug view; and the mean passes."""
 
 from collections.abc import Iterator
+from itertools import combinations
 
 from ...scene import Channel, DebugView
 from ..device import Device
@@ -24,13 +25,17 @@ class CompositePass:
 
     @classmethod
     def variants(cls) -> Iterator[ProgramSpec]:
-        """Radiance, black or a debug view, with every set of mean passes."""
+        """Radiance, black or a debug view; every pair of mean passes and all of them, with and without what they read.
+
+        Passes do not depend on one another nor on what the picture shows.
+        """
         shown = [{"DIRECT"}, set[str](), *({f"DEBUG_{view.value}"} for view in DebugView if view is not DebugView.NONE)]
-        for film in subsets(f"FILM_{channel.value}" for channel in SUM_CHANNELS if channel is not Channel.COMBINED):
-            for view in shown:
-                yield _program(film | view)
-                if "FILM_DIFFUSE_COLOR" in film:
-                    yield _program(film | view | {"SPECULAR"})
+        passes = [f"FILM_{channel.value}" for channel in SUM_CHANNELS if channel is not Channel.COMBINED]
+        films = [set(passes), *(set(pair) for pair in combinations(passes, 2)), *({name} for name in passes)]
+        yield from (_program(frozenset(view)) for view in shown)
+        for film in films:
+            for read in subsets(("SPECULAR", "DIFFUSE_ROUGHNESS", "SPLIT", "ENVIRONMENT")):
+                yield _program(read | film | {"DIRECT"})
 
     def prepare(self, frame: Frame, planned: PlannedPass) -> None:
         """Nothing but uniforms, which `run` writes."""
@@ -41,10 +46,11 @@ class CompositePass:
         frame.film.begin_sample(frame.pool.framebuffer(tuple((target.name, 0) for target in planned.writes)))
         self._fullscreen.bind(frame, spec, planned)
         debug = frame.settings.debug_view is not DebugView.NONE
-        visible = not debug and not frame.settings.transparent_film
+        world = frame.scene.world
+        opaque = not debug and not frame.settings.transparent_film
         self._fullscreen.draw(
             spec,
-            background=(*frame.scene.world.radiance, 1.0) if visible else (0.0, 0.0, 0.0, 0.0),
+            background=(*(world.radiance if world.seen_by_camera else (0.0, 0.0, 0.0)), float(opaque)),
             shown_layer=min(frame.settings.debug_layer, frame.plan.layers - 1) if debug else 0,
         )
 

@@ -1,23 +1,41 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Direct light: outgoing radiance of every layer from lamps, the constant world and emission. No shadows yet."""
+"""Direct light: outgoing radiance of every layer from lamps, emissive surfaces, the world and the surface itself."""
 
 from collections.abc import Iterator
+from itertools import combinations
+from math import sqrt
 
 import moderngl
 
 from ..device import Device
-from ..direct_needs import DIRECT_DEFINES
-from ..light_table import LIGHTS_PER_ROW, TEXELS_PER_LIGHT, light_table
+from ..direct_needs import DIRECT_DEFINES, direct_program_defines
+from ..layout import LIGHTS_PER_PAGE, TILE_SIZE, light_pages
+from ..light_table import LIGHTS_PER_ROW, TEXELS_PER_LIGHT, TEXELS_PER_SAMPLE
 from ..plan import PlannedPass
 from ..programs import ProgramSpec
+from ..sampling import pixel_shift
+from ..shadow_table import TEXELS_PER_MAP
 from ..uniforms import UniformBlock
-from .base import Frame, subsets
+from .base import Frame
 from .fullscreen import FullscreenDraw, fullscreen_program
 
 DIRECT_UNIFORMS = UniformBlock(
     "DirectUniforms",
-    (("world_radiance", "vec4"), ("light_sample", "vec2"), ("light_count", "int"), ("layer", "int")),
+    (
+        ("world_radiance", "vec4"),
+        ("world_factors", "vec2"),  # on what it causes by diffuse and by glossy reflection
+        ("shadow_jitter", "vec2"),  # texels from where a sample looks a shadow up
+        ("pixel_shift", "vec2"),  # of every pixel's random numbers
+        ("highlight_jitter", "float"),  # about half the distance between a light's samples, its half size being 1
+        ("smallest_world_alpha", "float"),  # GGX roughness below which the world's samples would show one by one
+        ("light_count", "int"),
+        ("light_tile_pages", "int"),
+        ("layer", "int"),
+    ),
 )
+
+_DIRECTIONS_PER_LOBE = 4.0
+"""The world's samples must fall that densely into a reflection's lobe, or the world is looked up instead."""
 
 
 class DirectPass:
@@ -28,47 +46,72 @@ class DirectPass:
     def __init__(self, device: Device) -> None:
         self._device = device
         self._fullscreen = FullscreenDraw(device, DIRECT_UNIFORMS)
-        self._lights: moderngl.Texture | None = None
 
     @classmethod
     def variants(cls) -> Iterator[ProgramSpec]:
-        """Every combination of what a scene may have."""
-        yield from (_program(defines) for defines in subsets(DIRECT_DEFINES) if defines)
+        """Every two of what a scene may have, alone, with everything else, and left out of everything."""
+        every = frozenset(DIRECT_DEFINES)
+        pairs = [frozenset(pair) for pair in combinations(DIRECT_DEFINES, 2)]
+        chosen = {every, frozenset({"EMISSION"}), *pairs, *(every - pair for pair in pairs)}
+        chosen |= {every - {name} for name in every} | {pair | {"SPLIT"} for pair in pairs}
+        programs = {direct_program_defines(defines, preview=preview) for defines in chosen for preview in (False, True)}
+        yield from (_program(defines) for defines in sorted(programs, key=sorted))
 
     def prepare(self, frame: Frame, planned: PlannedPass) -> None:
-        """Upload the light table."""
-        if self._lights is not None:
-            self._lights.release()
-            self._lights = None
-        if frame.scene.lights:
-            table = light_table(frame.scene.lights, frame.camera.position)
-            self._lights = self._device.context.texture((table.shape[1], table.shape[0]), 4, table, dtype="f4")
-            self._lights.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        """Nothing but uniforms, which `run` writes."""
 
     def run(self, frame: Frame, planned: PlannedPass) -> None:
-        """Shade all layers."""
-        spec = _program(planned.defines)
+        """Shade all layers; the picture's own tells diffuse from glossy where somebody asks."""
+        defines = direct_program_defines(planned.defines, preview=frame.lighting.preview)
         self._device.context.enable_only(moderngl.NOTHING)
-        self._fullscreen.bind(frame, spec, planned)
-        if self._lights is not None:
-            self._lights.use(spec.samplers.index("light_table"))
         for layer in range(frame.plan.layers):
-            frame.pool.framebuffer(tuple((target.name, layer) for target in planned.writes)).use()
-            self._fullscreen.draw(
-                spec,
-                world_radiance=(*frame.scene.world.radiance, 0.0),
-                light_sample=frame.sample.light,
-                light_count=len(frame.scene.lights),
-                layer=layer,
-            )
+            split = layer == 0 and "SPLIT" in defines
+            spec = _program(defines if split else defines - {"SPLIT"})
+            self._fullscreen.bind(frame, spec, planned)
+            self._bind(frame, spec)
+            targets = planned.writes if split else planned.writes[:1]
+            frame.pool.framebuffer(tuple((target.name, layer) for target in targets)).use()
+            self._fullscreen.draw(spec, **self._uniforms(frame), layer=layer)
 
     def release(self) -> None:
-        """Free the pass's buffers and textures."""
+        """Free the pass's buffers."""
         self._fullscreen.release()
-        if self._lights is not None:
-            self._lights.release()
+
+    def _bind(self, frame: Frame, spec: ProgramSpec) -> None:
+        lighting = frame.lighting
+        if "LIGHTS" in spec.defines:
+            lighting.table().use(spec.samplers.index("light_table"))
+            lighting.upload_samples().use(spec.samplers.index("light_samples"))
+        if "SHADOWS" in spec.defines and frame.shadows is not None:
+            if frame.shadows.atlas is not None:
+                frame.shadows.atlas.use(spec.samplers.index("shadow_atlas"))
+            frame.shadows.table.use(spec.samplers.index("shadow_table"))
+
+    def _uniforms(self, frame: Frame) -> dict[str, object]:
+        world, lighting, settings = frame.scene.world, frame.lighting, frame.settings
+        shift = pixel_shift(frame.sample.index)
+        directions = max(lighting.plan.world_directions * settings.samples, 1)
+        return {
+            "world_radiance": (*world.radiance, 0.0),
+            "world_factors": (float(world.seen_by_diffuse), float(world.seen_by_glossy)),
+            "shadow_jitter": (shift[0] - 0.5, shift[1] - 0.5),
+            "pixel_shift": shift,
+            "highlight_jitter": lighting.point_spacing,
+            # A lobe of roughness α is about 4πα² wide; so many of the directions, spread over 4π, fall into it.
+            "smallest_world_alpha": sqrt(_DIRECTIONS_PER_LOBE / directions),
+            "light_count": lighting.count,
+            "light_tile_pages": light_pages(lighting.plan.count) if lighting.plan.many else 0,
+        }
 
 
 def _program(defines: frozenset[str]) -> ProgramSpec:
-    table_shape = {f"LIGHTS_PER_ROW {LIGHTS_PER_ROW}", f"TEXELS_PER_LIGHT {TEXELS_PER_LIGHT}"}
-    return fullscreen_program("direct/direct.frag", DIRECT_UNIFORMS, defines | table_shape, samplers=("light_table",))
+    sizes = {
+        f"LIGHTS_PER_ROW {LIGHTS_PER_ROW}",
+        f"TEXELS_PER_LIGHT {TEXELS_PER_LIGHT}",
+        f"TEXELS_PER_SAMPLE {TEXELS_PER_SAMPLE}",
+        f"TEXELS_PER_MAP {TEXELS_PER_MAP}",
+        f"TILE_SIZE {TILE_SIZE}",
+        f"LIGHTS_PER_PAGE {LIGHTS_PER_PAGE}",
+    }
+    samplers = ("light_table", "light_samples", "shadow_atlas", "shadow_table")
+    return fullscreen_program("direct/direct.frag", DIRECT_UNIFORMS, defines | sizes, samplers=samplers)

@@ -32,7 +32,11 @@ _CHANNEL_SAMPLERS = {
     "exit.view_depth": "exit_view_depth_layers",
     "exit.normal": "exit_normal_layers",
     "exit.base_color": "exit_base_color_layers",
+    "tiles.depth": "tile_depth_layers",
+    "tiles.lights": "tile_lights",
     "direct.radiance": "radiance_layers",
+    "direct.diffuse": "diffuse_layers",
+    "direct.glossy": "glossy_layers",
 }
 """Target -> the sampler that shaders read it through."""
 

@@ -172,9 +172,9 @@ class Rasterizer:
         poses = {*(("PREVIOUS_POSE",) if previous else ()), *(("NEXT_POSE",) if following else ())}
         program = replace(program, defines=program.defines | poses)
         times = OtherTimes(previous, following)
-        surfaces = {draw.surface for draw in scene_draws.draws}
+        surfaces = {draw.surface for draw in scene_draws.seen}
         programs = {surface: self._device.programs.get(program.spec(surface, self._depth)) for surface in surfaces}
-        for draw in scene_draws.draws:
+        for draw in scene_draws.seen:
             compiled = programs[draw.surface]
             scene_draws.bind_material(draw, _MATERIAL_BINDING)
             if draw.texture is not None:
@@ -272,7 +272,7 @@ def geometry_variants() -> Iterator[ProgramSpec]:
             yield GeometryProgram(written, frozenset(test)).spec(surface, depth)
     for surface, depth in product(SURFACES, depths):
         yield GeometryProgram(EXIT_CHANNELS, frozenset({"EXIT"})).spec(surface, depth)
-    by_vertex = [channel for channel in optional if channel.name in ("normal", "object_index", "motion")]
+    by_vertex = [channel for channel in optional if channel.name in ("normal", "material", "object_index", "motion")]
     poses = subsets(("PREVIOUS_POSE", "NEXT_POSE"))
     vertices = [frozenset({"EXIT"}), *poses, *(frozenset({"LOOK_AHEAD"}) | pose for pose in poses)]
     ways = ((2, Layering.VERTEX_SHADER), *((layers, Layering.GEOMETRY_SHADER) for layers in (1, 2, 9)))

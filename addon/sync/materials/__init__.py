@@ -6,7 +6,16 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from ...scene import BaseColorSource, Extension, Image, ImageTexture, Interpolation, Material, RenderSettings
+from ...scene import (
+    BaseColorSource,
+    EmissionSampling,
+    Extension,
+    Image,
+    ImageTexture,
+    Interpolation,
+    Material,
+    RenderSettings,
+)
 from ...scene.arrays import Color
 from ..changes import Messages, new_version
 from ..keys import DEFAULT_MATERIAL, id_key
@@ -179,6 +188,14 @@ def _material(key: str, material: bpy.types.Material, surface: Surface) -> Mater
         alpha=unit(as_value(surface.alpha.factor)),
         metallic=surface.metallic,
         roughness=surface.roughness,
+        diffuse_roughness=surface.diffuse_roughness,
         specular=surface.specular,
         emission=surface.emission,
+        emission_sampling=_emission_sampling(material),
     )
+
+
+def _emission_sampling(material: Any) -> EmissionSampling:
+    """Cycles' own setting of the material; its default where that add-on is disabled."""
+    settings = getattr(material, "cycles", None)
+    return EmissionSampling.AUTO if settings is None else EmissionSampling(settings.emission_sampling)

@@ -12,8 +12,9 @@ def missing_attribute_messages(scene: Scene, messages: Messages) -> None:
     for batch in scene.batches:
         mesh = scene.meshes[batch.mesh]
         for slot in mesh.slots:
-            cause = _cause(scene.materials[batch.materials[min(slot.slot, len(batch.materials) - 1)]], mesh)
-            if cause is not None:
+            material = scene.materials[batch.materials[min(slot.slot, len(batch.materials) - 1)]]
+            cause = _cause(material, mesh)
+            if cause is not None and (batch.seen_by_camera or material.is_alpha_tested):
                 messages.add_named(cause, mesh.name)
 
 

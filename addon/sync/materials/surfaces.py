@@ -28,6 +28,7 @@ class Surface:
     base_color: Expression = NOTHING
     metallic: float = 0.0
     roughness: float = 0.5
+    diffuse_roughness: float = 0.0
     specular: float = 0.0
     emission: Color = BLACK
     alpha: Expression = EVERYTHING
@@ -105,7 +106,6 @@ def _principled(source: Source, evaluator: Evaluator) -> Surface:
         Coat_Weight="the coat is",
         Sheen_Weight="sheen is",
         Thin_Film_Thickness="thin film is",
-        Diffuse_Roughness="diffuse roughness is",
     )
     metallic = inputs.unit("Metallic")
     if inputs.is_used("Anisotropic") and (metallic > 0.0 or inputs.value("Specular IOR Level") > 0.0):
@@ -124,6 +124,7 @@ def _principled(source: Source, evaluator: Evaluator) -> Surface:
         base_color=base_color,
         metallic=metallic,
         roughness=inputs.roughness(),
+        diffuse_roughness=inputs.unit("Diffuse Roughness"),
         specular=unit(specular),
         emission=_emitted(inputs, "Emission Color", "Emission Strength"),
         alpha=inputs.expression("Alpha"),
@@ -140,8 +141,7 @@ def _emitted(inputs: _Inputs, color: str, strength: str) -> Color:
 def _diffuse(source: Source, evaluator: Evaluator) -> Surface:
     inputs = _Inputs(source, evaluator)
     inputs.warn_normal()
-    inputs.warn_used(Roughness="diffuse roughness is")
-    return Surface(base_color=inputs.expression("Color"))
+    return Surface(base_color=inputs.expression("Color"), diffuse_roughness=inputs.roughness())
 
 
 def _like_diffuse(source: Source, evaluator: Evaluator) -> Surface:
@@ -258,7 +258,8 @@ def _weighted(
     if total == 0.0:
         return replace(first, base_color=NOTHING, specular=0.0, weight=0.0)
     parts = weights[0] / total, weights[1] / total
-    if min(weights) > 0.0 and (first.metallic, first.roughness) != (second.metallic, second.roughness):
+    averaged = "metallic", "roughness", "diffuse_roughness"
+    if min(weights) > 0.0 and any(getattr(first, name) != getattr(second, name) for name in averaged):
         evaluator.warn(node, "shaders are not mixed exactly; one surface with their averages is shown")
 
     def average(name: str) -> float:
@@ -268,6 +269,7 @@ def _weighted(
         base_color=_mixed_color(first, second, weights, node, evaluator),
         metallic=average("metallic"),
         roughness=average("roughness"),
+        diffuse_roughness=average("diffuse_roughness"),
         specular=average("specular") * total,
         weight=total,
     )

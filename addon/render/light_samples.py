@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which point of every light a sample of the film uses: the same for all pixels, so that its shadow can be drawn."""
+
+from collections.abc import Sequence
+from functools import lru_cache
+from math import gcd
+from zlib import crc32
+
+import numpy as np
+
+from ..scene.arrays import Float64Array, Int64Array
+
+_RATIOS = (0.3819660112501051, 0.6180339887498949, 0.7548776662466927)
+"""Golden ratios (of the plane's lattice and of space's): steps along an axis that fill it evenly, however many."""
+
+_BALL_TABLE_SIZE = 4097
+
+
+def points_used(light_count: int, samples: int, updates: int) -> int:
+    """How many points of each of `light_count` lights `samples` samples use, where `updates` of them change a sample."""
+    return max(-(-(samples - 1) * min(updates, light_count) // max(light_count, 1)), 0) + 1
+
+
+def held_points(light_count: int, sample: int, updates: int) -> Int64Array:
+    """(L,) which of its points each light uses in a sample: 0 in the first, then `updates` lights go on per sample.
+
+    All do where there are no more than that. In turn: whatever the numbers, no light falls behind by more than one.
+    """
+    if light_count <= updates:
+        return np.full(light_count, sample, np.int64)
+    return (sample * updates - 1 - np.arange(light_count)) // light_count + 1
+
+
+def lattice_points(indices: Int64Array, count: int, shifts: Float64Array) -> Float64Array:
+    """Points (N, 3) in [0, 1) with numbers `indices` (N,) of a rank-1 lattice of `count` points, each shifted (N, 3).
+
+    Sloan and Joe 1994, "Lattice Methods for Multiple Integration". Any stretch of successive numbers is spread evenly,
+    too: a film that is shown or stopped early is as even as it can be.
+    """
+    return np.modf(np.outer(indices % count, _generators(count)) / count + shifts)[0]
+
+
+@lru_cache(maxsize=64)
+def _generators(count: int) -> tuple[int, int, int]:
+    """The lattice's steps along each axis, in parts of `count`."""
+    step, second, third = (_coprime(count, ratio) for ratio in _RATIOS)
+    return step, step * second % count, step * third % count
+
+
+def _coprime(count: int, ratio: float) -> int:
+    step = max(round(count * ratio), 1)
+    while gcd(step, count) != 1:
+        step += 1
+    return step
+
+
+def light_shifts(keys: Sequence[str], seed: int) -> Float64Array:
+    """(L, 3) in [0, 1): where each light's lattice starts, by its key, so that other lights change nothing."""
+    return np.array(
+        [np.random.default_rng((crc32(key.encode()), seed)).random(3) for key in keys], np.float64
+    ).reshape(-1, 3)
+
+
+def folded(points: Float64Array) -> Float64Array:
+    """Points in [0, 1) folded at ½, so that a lattice integrates what is smooth but not periodic as well as if it were.
+
+    Hickernell 2002, "Obtaining O(N^−2+ε) Convergence for Lattice Quadrature Rules" (baker's transformation).
+    """
+    return 1.0 - np.abs(2.0 * points - 1.0)
+
+
+def square_points(points: Float64Array) -> Float64Array:
+    """Unit cube (N, 3) -> (x, y, 0) uniform in the square −1…1."""
+    square = 2.0 * folded(points) - 1.0
+    square[:, 2] = 0.0
+    return square
+
+
+def disk_points(points: Float64Array) -> Float64Array:
+    """Unit cube (N, 3) -> (x, y, 0) uniform in the unit disk (Shirley and Chiu 1997)."""
+    x, y, _ = square_points(points).T
+    wide = np.abs(x) > np.abs(y)
+    radius = np.where(wide, x, y)
+    along, across = np.where(wide, y, x), np.where(radius == 0.0, 1.0, radius)
+    angle = 0.25 * np.pi * along / across
+    angle = np.where(wide, angle, 0.5 * np.pi - angle)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros_like(x)], axis=-1)
+
+
+def ball_points(points: Float64Array) -> Float64Array:
+    """Unit cube (N, 3) -> points of the unit ball that are uniform in a disk from whatever side they are seen.
+
+    Their density is 1/(π² √(1 − r²)), the inverse Abel transform of the disk's (Bracewell 1978, ch. 12): one point
+    serves every receiver, who sees it on the disk that faces him.
+    """
+    share, radii = _ball_cdf()
+    radius = np.interp(points[:, 2], share, radii)
+    z = 1.0 - 2.0 * points[:, 0]
+    around = np.sqrt(np.maximum(1.0 - z * z, 0.0))
+    azimuth = 2.0 * np.pi * points[:, 1]
+    return radius[:, None] * np.stack([around * np.cos(azimuth), around * np.sin(azimuth), z], axis=-1)
+
+
+@lru_cache(maxsize=1)
+def _ball_cdf() -> tuple[Float64Array, Float64Array]:
+    """Share of the ball's points within a radius: (2/π)(asin r − r √(1 − r²)); dense where it rises steeply, near 1."""
+    radii = np.sin(np.linspace(0.0, 0.5 * np.pi, _BALL_TABLE_SIZE))
+    return (np.arcsin(radii) - radii * np.sqrt(1.0 - radii**2)) * (2.0 / np.pi), radii

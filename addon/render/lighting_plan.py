@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which lights a picture is lit by, and why the others are left out. Pure: no OpenGL, no Blender."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..scene import Camera, EmissionSampling, Light, RenderSettings, Scene
+from .light_reach import MANY_LIGHTS, extent, farthest_reach, full_reach, lights_out_of_reach, peak_intensity
+from .mesh_lights import MeshLight, mesh_lights
+
+
+@dataclass(frozen=True)
+class LightPlan:
+    """The lights of a picture.
+
+    `lights`, `mesh_lights`: sampled every sample. `reach` (m) of each of `lights`: beyond it one is only sampled now and
+    then. `world_directions`: from how many directions the world lights each sample. `preview`: whether the first sample
+    shows lights by closed forms and their shadows from their centres. `casts_shadows`: whether anything does.
+    """
+
+    lights: tuple[Light, ...] = ()
+    mesh_lights: tuple[MeshLight, ...] = ()
+    reach: tuple[float, ...] = ()
+    world_directions: int = 0
+    preview: bool = False
+    casts_shadows: bool = False
+
+    @property
+    def count(self) -> int:
+        """Lights of a sample, directions of the world included."""
+        return len(self.lights) + len(self.mesh_lights) + self.world_directions
+
+    @property
+    def many(self) -> bool:
+        """Whether pixels ask only the lights that reach them."""
+        return len(self.lights) > MANY_LIGHTS
+
+
+def plan_lights(
+    scene: Scene, settings: RenderSettings, camera: Camera | None, *, continuous: bool
+) -> tuple[LightPlan, list[tuple[str, str]]]:
+    """The lights of a picture, and (name, reason) of what is left out."""
+    left_out: list[tuple[str, str]] = []
+    lights = _lights_in_reach(scene, settings, camera, left_out)
+    surfaces, dim = mesh_lights(scene)
+    left_out += [
+        (f"light of {light.name}", "too faint to be sampled as a light; left to indirect light") for light in dim
+    ]
+    unmarked = any(
+        material.is_emissive and material.emission_sampling is EmissionSampling.NONE
+        for material in scene.materials.values()
+    )
+    if unmarked:
+        left_out.append(("light of emissive materials", "their Emission Sampling is None; left to indirect light"))
+    casts = any(light.casts_shadow for light in lights) or bool(surfaces) or scene.world.shines
+    casters = any(batch.casts_shadow for batch in scene.batches)
+    intensities = np.array([peak_intensity(light) for light in lights])
+    extents = np.array([extent(light) for light in lights])
+    reach = full_reach(intensities, extents, settings.light_threshold)
+    planned = LightPlan(
+        lights,
+        surfaces,
+        tuple(float(distance) for distance in reach),
+        settings.world_directions if scene.world.shines else 0,
+        preview=continuous or settings.samples == 1,
+        casts_shadows=casts and casters,
+    )
+    return planned, left_out
+
+
+def _lights_in_reach(
+    scene: Scene, settings: RenderSettings, camera: Camera | None, left_out: list[tuple[str, str]]
+) -> tuple[Light, ...]:
+    """Those that may reach what the camera sees."""
+    if camera is None or not scene.lights:
+        return scene.lights
+    intensities = np.array([peak_intensity(light) for light in scene.lights])
+    extents = np.array([extent(light) for light in scene.lights])
+    full = full_reach(intensities, extents, settings.light_threshold)
+    farthest = farthest_reach(full, settings.samples, settings.seed)
+    lost = dict(lights_out_of_reach(scene.lights, farthest, scene, camera))
+    left_out += [(f"light “{scene.lights[index].name}”", reason) for index, reason in lost.items()]
+    return tuple(light for index, light in enumerate(scene.lights) if index not in lost)

@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What shadow maps a light needs for what the camera sees: which way they look, how far and how finely."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import ceil, floor, log, log2, pi, tan
+
+import numpy as np
+
+from ..scene import Camera
+from ..scene.arrays import BoolArray, Float64Array
+from .receivers import Receivers
+
+SMALLEST_SIZE = 32
+WIDEST_SINGLE = pi / 3.0
+"""Half angle (rad) of the widest cone that one map covers; wider ones take the faces of a cube."""
+
+MOST_CASCADES = 4
+
+_FINEST_SHARE = 0.1
+"""Share of the tiles that may see their shadow coarser than their pixels: the few nearest would ask for any size."""
+
+_CASCADE_RATIO = 4.0
+"""Ratio of view depths of one cascade's ends at most, where a single map would be too coarse."""
+
+_NEAREST_SHARE = 1e-6
+"""Near plane of perspective maps over the farthest distance: 1/z in float32 does not mind."""
+
+
+@dataclass(frozen=True)
+class ShadowMap:
+    """One map: what its `camera` sees in `size` × `size` texels."""
+
+    camera: Camera
+    size: int
+
+
+@dataclass(frozen=True)
+class Cone:
+    """Directions that a light shines in: within `half_angle` (rad) of `axis` (3,); π for all."""
+
+    axis: Float64Array
+    half_angle: float
+
+
+class LocalReceivers:
+    """Receivers as one light near them sees them; for all points of the light alike, which is `extent` m about."""
+
+    def __init__(self, receivers: Receivers, position: Float64Array, extent: float, cone: Cone, reach: float) -> None:
+        centers, radii = receivers.balls
+        center = centers - position
+        radius = radii + extent
+        distance = np.linalg.norm(center, axis=-1)
+        within = distance - radius < reach
+        if cone.half_angle < pi:
+            cosine = center @ cone.axis / np.maximum(distance, 1e-300)
+            angle = np.arccos(np.clip(cosine, -1.0, 1.0))
+            slack = np.arcsin(np.clip(radius / np.maximum(distance, 1e-300), 0.0, 1.0))
+            within &= (angle < cone.half_angle + slack) | (distance <= radius)
+        self._corners = receivers.corners[within] - position
+        self._extent = extent
+        # A texel should not be larger than a pixel, both seen from the light.
+        nearest = np.maximum(distance - radius, 0.5 * distance)
+        self._texel_angles = receivers.pixels[within] / np.maximum(nearest[within], 1e-12)
+        self.farthest = float((distance + radius)[within].max(initial=0.0))
+
+    @property
+    def any(self) -> bool:
+        """Whether the light reaches anything that is seen."""
+        return len(self._corners) > 0
+
+    def faces(self) -> BoolArray:
+        """(6, P) which receivers each face of a cube about the light may see: +X, −X, +Y, −Y, +Z, −Z."""
+        seen: list[BoolArray] = []
+        slack = 2.0 * self._extent
+        for axis in range(3):
+            for sign in (1.0, -1.0):
+                ahead = sign * self._corners[..., axis] + slack
+                sides = [self._corners[..., other] for other in range(3) if other != axis]
+                outside = [(ahead < side).all(axis=1) for side in (*sides, *(-side for side in sides))]
+                seen.append(~np.logical_or.reduce(outside) & (ahead > 0.0).any(axis=1))
+        return np.array(seen)
+
+    def size(self, width: float, largest: int, texel_angle: float, seen: BoolArray | None = None) -> int:
+        """Texels a side for a map whose window is `width` wide at distance 1: a power of two.
+
+        `texel_angle`: the smallest that the light's own limit allows, m at a distance of 1 m.
+        """
+        angles = self._texel_angles if seen is None else self._texel_angles[seen]
+        wanted = max(float(np.quantile(angles, _FINEST_SHARE)), texel_angle, 1e-12)
+        return _power_of_two(width / wanted, largest)
+
+
+def cone_map(position: Float64Array, cone: Cone, receivers: LocalReceivers, largest: int, texel: float) -> ShadowMap:
+    """The one map of a light that shines in a narrow cone."""
+    half = tan(min(cone.half_angle, WIDEST_SINGLE))
+    size = receivers.size(2.0 * half, largest, texel)
+    # The outermost texels are a margin, so that a lookup beside the edge stays inside.
+    half *= size / (size - 2.0)
+    camera = _perspective(position, cone.axis, (-half, half, -half, half), receivers.farthest)
+    return ShadowMap(camera, size)
+
+
+def cube_maps(
+    position: Float64Array, receivers: LocalReceivers, largest: int, texel: float
+) -> tuple[ShadowMap | None, ...]:
+    """The six faces of a cube about a light, None where a face sees nothing that is seen."""
+    maps: list[ShadowMap | None] = []
+    for face, seen in enumerate(receivers.faces()):
+        if not seen.any():
+            maps.append(None)
+            continue
+        axis = np.zeros(3)
+        axis[face // 2] = -1.0 if face % 2 else 1.0
+        size = receivers.size(2.0, largest, texel, seen)
+        half = size / (size - 2.0)
+        maps.append(ShadowMap(_perspective(position, axis, (-half, half, -half, half), receivers.farthest), size))
+    return tuple(maps)
+
+
+def sun_maps(
+    direction: Float64Array, receivers: Receivers, casters: Float64Array, size: int, texel: float, cascades: int
+) -> tuple[ShadowMap, ...]:
+    """Maps of light that comes along `direction` (3,), nearest part of the view first.
+
+    `casters` (K, 2, 3): bounds of what may cast shadows, world space. At most `cascades` maps, of `size` texels a side;
+    `texel` (m): smallest that the light's own limit allows.
+    """
+    if receivers.count == 0:
+        return ()
+    frame = look_along(direction)
+    whole = _extent(receivers, frame)
+    nearest = float(np.quantile(receivers.near, 0.02))
+    farthest = float(receivers.far.max())
+    pixel = receivers.pixel_size + max(nearest, farthest * 1e-4) * receivers.pixel_slope
+    coarseness = whole / (size * max(pixel, texel, 1e-12))
+    count = 1
+    if coarseness > 2.0 and receivers.pixel_slope > 0.0:
+        count = min(ceil(log(coarseness / 2.0) / log(_CASCADE_RATIO)) + 1, cascades)
+    start = max(nearest, farthest * 1e-4)
+    ends = [start * (farthest / start) ** ((i + 1) / count) for i in range(count - 1)]
+    parts = [
+        receivers.between(low, high) for low, high in zip([0.0, *ends], [*ends, farthest], strict=True)
+    ]
+    return tuple(_orthographic(part, frame, casters, size, texel) for part in parts if part.count)
+
+
+def look_along(direction: Float64Array) -> Float64Array:
+    """(3, 3) rotation whose −Z is a unit direction; without jumps except at one (Duff et al. 2017)."""
+    z = -np.asarray(direction, np.float64)
+    sign = 1.0 if z[2] >= 0.0 else -1.0
+    a = -1.0 / (sign + z[2])
+    b = z[0] * z[1] * a
+    x = np.array([1.0 + sign * z[0] * z[0] * a, sign * b, -sign * z[0]])
+    y = np.array([b, sign + z[1] * z[1] * a, -z[1]])
+    return np.stack([x, y, z], axis=1)
+
+
+def _perspective(
+    position: Float64Array, axis: Float64Array, window: tuple[float, float, float, float], farthest: float
+) -> Camera:
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = look_along(axis), position
+    reach = _rounded_up(max(farthest, 1e-6))
+    return Camera(pose, window, _NEAREST_SHARE * reach, 2.0 * reach)
+
+
+def _extent(receivers: Receivers, frame: Float64Array) -> float:
+    corners = receivers.corners.reshape(-1, 3) @ frame[:, :2]
+    return float((corners.max(axis=0) - corners.min(axis=0)).max())
+
+
+def _orthographic(
+    receivers: Receivers, frame: Float64Array, casters: Float64Array, size: int, texel: float
+) -> ShadowMap:
+    """One map around receivers. Its place is snapped, so that it stays the same while the camera moves a little."""
+    corners = receivers.corners.reshape(-1, 3) @ frame
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    side = _rounded_up(1.15 * max(float((high - low)[:2].max()), 1e-9))
+    step = side / 16.0
+    x, y = (step * floor(value / step + 0.5) for value in 0.5 * (low + high)[:2])
+    towards = [float(high[2])]  # light space: the light is at +Z
+    if len(casters):
+        corners_z = np.stack(_corner_heights(casters, frame[:, 2]))
+        towards.append(float(corners_z.max()))
+    depth = _rounded_up(max(towards) - float(low[2]) + 0.05 * side)
+    end = step * floor(float(low[2]) / step) - 0.01 * side
+    pose = np.eye(4)
+    pose[:3, :3] = frame
+    pose[:3, 3] = frame @ np.array([x, y, end + depth + step])
+    half = 0.5 * side
+    wanted = _power_of_two(side / texel, size) if texel > 0.0 else size
+    return ShadowMap(Camera(pose, (-half, half, -half, half), 0.0, depth + step, orthographic=True), wanted)
+
+
+def _corner_heights(bounds: Float64Array, axis: Float64Array) -> Iterable[Float64Array]:
+    """Greatest and smallest coordinate (K,) of each box along an axis."""
+    low, high = bounds[:, 0] * axis, bounds[:, 1] * axis
+    return np.maximum(low, high).sum(axis=1), np.minimum(low, high).sum(axis=1)
+
+
+def _rounded_up(value: float) -> float:
+    """To the next of four steps per octave: small changes of what is seen change no map."""
+    return 2.0 ** (ceil(4.0 * log2(value)) / 4.0)
+
+
+def _power_of_two(texels: float, largest: int) -> int:
+    return int(min(max(2 ** ceil(log2(max(texels, 1.0))), SMALLEST_SIZE), largest))

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The disc of a physical sky's sun as a light."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..scene import Light, LightKind
+from ..scene.arrays import Color, Float64Array
+from .lights import rigid_matrix
+from .sky import SMALLEST_SUN, Sky, single_scattering_sun
+from .sky_multiple import multiple_scattering_sun
+
+_LIMB_DARKENING = 0.6
+_RINGS, _SPOKES = 32, 64
+_SEA_LEVEL = 6371e3  # m, the radius beyond which the Earth hides the sun
+
+
+def sun_light(key: str, name: str, sky: Sky, size: float, color: Color, environment_from_world: Float64Array) -> Light:
+    """The sun of `sky`, of angular diameter `size` (rad) and with `color` as factor, as a light.
+
+    `environment_from_world` (3, 3), a rotation, turns world space into the sky's.
+    """
+    size = max(size, SMALLEST_SUN)
+    matrix = np.eye(4)
+    matrix[:3, 2] = environment_from_world.T @ sky.sun_direction
+    matrix[:3, 1] = environment_from_world.T @ np.array([0.0, 0.0, 1.0])
+    red, green, blue = sun_irradiance(sky, size) * color
+    emission = float(red), float(green), float(blue)
+    return Light(key, name, LightKind.SUN, rigid_matrix(matrix), emission, angle=size)
+
+
+def sun_irradiance(sky: Sky, size: float) -> Float64Array:
+    """(3,) scene-linear irradiance (W/m²) of the sun's disc on a surface that faces its centre.
+
+    The disc darkens towards its limb and brightens from its lowest to its highest point, as in Cycles, and ends at the
+    horizon of the point from which it is seen.
+    """
+    half = 0.5 * size
+    solid_angle = 2.0 * np.pi * (1.0 - np.cos(half))
+    rings = (np.arange(_RINGS) + 0.5) / _RINGS
+    cosine = 1.0 - rings * (1.0 - np.cos(half))
+    angle = np.arccos(cosine)[:, None]
+    around = (np.arange(_SPOKES) + 0.5) * (2.0 * np.pi / _SPOKES)
+    sine = np.sin(sky.sun_elevation) * np.cos(angle) + np.cos(sky.sun_elevation) * np.sin(angle) * np.cos(around)
+    elevation = np.arcsin(np.clip(sine, -1.0, 1.0))
+    height = (elevation - sky.sun_elevation) / size + 0.5
+    lowest, highest = _edges(sky, half, solid_angle)
+    radiance = lowest + (highest - lowest) * height[..., None]
+    limb = 1.0 - _LIMB_DARKENING * (1.0 - np.sqrt(np.maximum(1.0 - (angle / half) ** 2, 0.0)))
+    weight = limb * (elevation > _horizon(sky)) * cosine[:, None]
+    return np.mean(radiance * weight[..., None], axis=(0, 1)) * solid_angle
+
+
+def _edges(sky: Sky, half: float, solid_angle: float) -> Float64Array:
+    """(2, 3) radiance of the disc's lowest and highest point."""
+    elevations = sky.sun_elevation + np.array([-half, half])
+    if sky.multiple:
+        return multiple_scattering_sun(sky, elevations, solid_angle)
+    if elevations[1] <= 0.0:
+        return np.zeros((2, 3))
+    return single_scattering_sun(sky, np.maximum(elevations, 0.0), solid_angle)
+
+
+def _horizon(sky: Sky) -> float:
+    """Elevation (rad) below which the Earth hides the sun."""
+    if sky.before_5:
+        return 0.0
+    return float(np.arcsin(_SEA_LEVEL / (_SEA_LEVEL + max(sky.air.altitude, 0.0)))) - 0.5 * np.pi

@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Light of whole lamps at a point, unshadowed and without sampling: what a preview of one sample shows.
+
+#include "common/bsdf.glsl"
+#include "common/lights.glsl"
+#include "common/ltc.glsl"
+
+// Angular size below which a light's directions count as one: the error of that is of second order.
+const float SMALLEST_ANGLE = 0.01;
+// A highlight of a light is that of its centre below this share of the lobe's width, and the whole light's above that.
+const vec2 POINT_TO_SOLID = vec2(0.1, 0.3);
+
+/** A cone of directions in which radiance is uniform. */
+struct LightCone
+{
+    vec3 direction;         // unit, from the surface
+    float sine;             // of the half angle, at most a right one
+    vec3 irradiance;        // of a surface that faces it, W/m²
+};
+
+/** Share of light that a point or spot light sends in a direction away from it. */
+float spot_factor(Light light, vec3 direction)
+{
+#ifdef SPOT_CONES
+    if (light.kind == LIGHT_SPOT)
+        return smoothstep(0.0, 1.0, (dot(direction, light.axis) - light.cone_cosine) / light.cone_softness);
+#endif
+    return 1.0;
+}
+
+/** The cone that a point, spot or sun light fills as seen from `position`; dark at the light's very centre. */
+LightCone light_cone(Light light, vec3 position)
+{
+#ifdef SUN_LIGHTS
+    if (light.kind == LIGHT_SUN)
+        return LightCone(-light.axis, sin(light.radius), light.emission);
+#endif
+    vec3 to_light = light.position - position;
+    float distance_squared = dot(to_light, to_light);
+    if (distance_squared == 0.0)
+        return LightCone(-light.axis, 0.0, vec3(0.0));
+    vec3 direction = to_light * inversesqrt(distance_squared);
+    float radius_squared = light.radius * light.radius;
+    // A facing disk is seen under the tangent radius / distance, a sphere under that sine.
+    float outer = light.spread_slope > 0.0 ? distance_squared + radius_squared : max(distance_squared, radius_squared);
+    return LightCone(direction, min(light.radius * inversesqrt(outer), 1.0),
+                     light.emission * (spot_factor(light, -direction) / outer));
+}
+
+/**
+ * Irradiance of a surface by a cone of uniform radiance, over that of one that faces it.
+ *
+ * Exact with the part below the horizon cut off: configuration factor of a sphere to a tilted planar element (Naraghi
+ * and Chung 1982), a sphere and a cone being the same directions. Narrow cones as flat disks. `cosine`: of the angle
+ * between normal and axis, `sine`: of the half angle.
+ */
+float cone_cosine_factor(float cosine, float sine)
+{
+    if (cosine >= sine)
+        return cosine;
+    if (cosine <= -sine)
+        return 0.0;
+    if (sine < SMALLEST_ANGLE) {
+        float t = cosine / sine;
+        float chord = sqrt(1.0 - t * t);
+        return sine / PI * (t * (0.5 * PI + asin(t) + t * chord) + 2.0 / 3.0 * chord * chord * chord);
+    }
+    float tangent_sine = sqrt(1.0 - cosine * cosine); // of the angle between normal and axis
+    float x = sqrt(1.0 - sine * sine) / sine;
+    float y = clamp(-x * cosine / tangent_sine, -1.0, 1.0);
+    float root = sqrt(1.0 - y * y);
+    return (cosine * acos(y) - x * tangent_sine * root + atan(tangent_sine * root, x) / (sine * sine)) / PI;
+}
+
+#ifdef AREA_LIGHTS
+/** Radiance in a direction with this cosine to the light's axis, over the light's emission. */
+float spread_factor(Light light, float cosine)
+{
+    if (light.spread_norm <= 0.0)
+        return 1.0;
+    return max(light.spread_slope - sqrt(max(1.0 - cosine * cosine, 0.0)) / cosine, 0.0) / light.spread_norm;
+}
+
+/** Whether the light's front faces a point, `center` being the light's as seen from there. */
+bool shines_on(Light light, vec3 center)
+{
+    return dot(center, light.axis) < 0.0;
+}
+
+float light_area(Light light)
+{
+    return length(light.half_x) * length(light.half_y) * (light.ellipse ? PI : 4.0);
+}
+
+/** Irradiance of a facing surface by a small light of which every part is seen as its centre. */
+vec3 small_area_irradiance(Light light, vec3 center)
+{
+    float distance_squared = dot(center, center);
+    float cosine = -dot(center, light.axis) * inversesqrt(distance_squared);
+    return light.emission * (spread_factor(light, cosine) * light_area(light) * cosine / distance_squared);
+}
+
+/** Largest half axis over the distance. */
+float angular_size(Light light, vec3 center)
+{
+    return sqrt(max(dot(light.half_x, light.half_x), dot(light.half_y, light.half_y)) / dot(center, center));
+}
+
+Polygon light_polygon(Light light, vec3 center)
+{
+    return light.ellipse ? ellipse_polygon(center, light.half_x, light.half_y)
+                         : rectangle_polygon(center, light.half_x, light.half_y);
+}
+
+/**
+ * Mean of the spread factor over the light as the surface receives it, by quadrature at 8x8 points.
+ *
+ * Only this mean is approximated: what it multiplies, the irradiance by the light without spread, is exact.
+ */
+float mean_spread(Light light, vec3 center, vec3 normal)
+{
+    const int POINTS = 8;
+    float received = 0.0;
+    float spread = 0.0;
+    for (int index = 0; index < POINTS * POINTS; ++index) {
+        vec2 u = (vec2(index % POINTS, index / POINTS) + 0.5) / float(POINTS);
+        // Of an ellipse, rings of equal area.
+        float angle = 2.0 * PI * u.x;
+        vec2 place = light.ellipse ? sqrt(u.y) * vec2(cos(angle), sin(angle)) : 2.0 * u - 1.0;
+        vec3 to_light = center + place.x * light.half_x + place.y * light.half_y;
+        float distance_squared = dot(to_light, to_light);
+        float cosine = -dot(to_light, light.axis) * inversesqrt(distance_squared);
+        float weight = max(dot(normal, to_light), 0.0) * cosine / (distance_squared * sqrt(distance_squared));
+        received += weight;
+        spread += weight * spread_factor(light, cosine);
+    }
+    return received > 0.0 ? spread / received : 0.0;
+}
+
+vec3 area_irradiance(Light light, vec3 center, vec3 normal)
+{
+    if (!shines_on(light, center))
+        return vec3(0.0);
+    if (angular_size(light, center) < SMALLEST_ANGLE)
+        return small_area_irradiance(light, center) * max(dot(normal, normalize(center)), 0.0);
+    vec3 tangent, bitangent;
+    orthonormal_basis(normal, tangent, bitangent);
+    mat3 local = transpose(mat3(tangent, bitangent, normal));
+    float covered = cosine_lobe_over(transformed(local, light_polygon(light, center)), vec3(0.0, 0.0, 1.0)).z;
+    float spread = light.spread_norm > 0.0 ? mean_spread(light, center, normal) : 1.0;
+    return light.emission * (PI * covered * spread);
+}
+#endif
+
+/** Unshadowed irradiance (W/m²) by a point, spot, sun or area light; a spot's edge is taken at the light's centre. */
+vec3 analytic_irradiance(Light light, vec3 position, vec3 normal)
+{
+#ifdef AREA_LIGHTS
+    if (light.kind == LIGHT_AREA)
+        return area_irradiance(light, light.position - position, normal);
+#endif
+    LightCone cone = light_cone(light, position);
+    return cone.irradiance * cone_cosine_factor(dot(normal, cone.direction), cone.sine);
+}
+
+#ifdef SPECULAR
+/** Columns: the view's projection onto the surface, across it, and the normal. */
+mat3 view_frame(vec3 normal, vec3 view)
+{
+    vec3 along = view - normal * dot(normal, view);
+    float squared = dot(along, along);
+    if (squared < FLOAT_EPSILON) {
+        vec3 tangent, bitangent;
+        orthonormal_basis(normal, tangent, bitangent);
+        return mat3(tangent, bitangent, normal);
+    }
+    along *= inversesqrt(squared);
+    return mat3(along, cross(normal, along), normal);
+}
+
+/**
+ * Radiance that the surface reflects of a polygon of radiance 1, whose corners are given from the surface.
+ *
+ * A polygon that covers little of the lobe is reflected as its mean direction is; one that covers all, by the albedo.
+ */
+vec3 reflected_polygon(Surface surface, Polygon polygon, vec3 normal, vec3 view)
+{
+    mat3 frame = view_frame(normal, view);
+    float n_dot_v = clamp(dot(normal, view), 0.0, 1.0);
+    CoveredLobe lobe = specular_lobe_over(transformed(transpose(frame), polygon), sqrt(surface.alpha), n_dot_v);
+    vec3 by_mean = specular_brdf_cosine(surface, normal, view, frame * lobe.mean) / lobe.density;
+    return lobe.share * mix(by_mean, surface.specular_albedo, lobe.share);
+}
+
+/** Half the angle in which a lobe reflects most, rad. */
+float lobe_width(Surface surface)
+{
+    return surface.alpha;
+}
+
+vec3 cone_specular(LightCone cone, Surface surface, vec3 normal, vec3 view)
+{
+    float solid = smoothstep(POINT_TO_SOLID.x, POINT_TO_SOLID.y, cone.sine / lobe_width(surface));
+    vec3 reflected = vec3(0.0);
+    if (solid < 1.0)
+        reflected = specular_brdf_cosine(surface, normal, view, cone.direction) * (1.0 - solid);
+    if (solid > 0.0) {
+        vec3 x, y;
+        orthonormal_basis(cone.direction, x, y);
+        float cosine = sqrt(max(1.0 - cone.sine * cone.sine, 0.0));
+        Polygon disk = ellipse_polygon(cosine * cone.direction, cone.sine * x, cone.sine * y);
+        reflected += reflected_polygon(surface, disk, normal, view) * (solid / (PI * cone.sine * cone.sine));
+    }
+    return cone.irradiance * reflected;
+}
+
+#ifdef AREA_LIGHTS
+/** Spread factor towards the part of the light that the surface mirrors best: nearest to the reflected view. */
+float mirrored_spread(Light light, vec3 center, vec3 normal, vec3 view)
+{
+    vec3 mirrored = reflect(-view, normal);
+    float facing = dot(mirrored, light.axis);
+    vec3 hit = facing < 0.0 ? mirrored * (dot(center, light.axis) / facing) - center : vec3(0.0);
+    vec2 place = vec2(dot(hit, light.half_x) / dot(light.half_x, light.half_x),
+                      dot(hit, light.half_y) / dot(light.half_y, light.half_y));
+    place = light.ellipse ? place / max(length(place), 1.0) : clamp(place, -1.0, 1.0);
+    vec3 to_light = center + place.x * light.half_x + place.y * light.half_y;
+    return spread_factor(light, -dot(to_light, light.axis) * inversesqrt(dot(to_light, to_light)));
+}
+
+vec3 area_specular(Light light, Surface surface, vec3 center, vec3 normal, vec3 view)
+{
+    if (!shines_on(light, center))
+        return vec3(0.0);
+    float solid = smoothstep(POINT_TO_SOLID.x, POINT_TO_SOLID.y, angular_size(light, center) / lobe_width(surface));
+    vec3 reflected = vec3(0.0);
+    if (solid < 1.0)
+        reflected = specular_brdf_cosine(surface, normal, view, normalize(center))
+                    * small_area_irradiance(light, center) * (1.0 - solid);
+    if (solid > 0.0) {
+        float spread = light.spread_norm > 0.0 ? mirrored_spread(light, center, normal, view) : 1.0;
+        reflected += reflected_polygon(surface, light_polygon(light, center), normal, view) * light.emission
+                     * (spread * solid);
+    }
+    return reflected;
+}
+#endif
+
+/**
+ * Radiance towards `view` that the surface reflects specularly of a point, spot, sun or area light, unshadowed.
+ *
+ * GGX of small lights, linearly transformed cosines of large ones, with the mean of Fresnel's reflectance over the lobe;
+ * a spot's edge is taken at the light's centre, an area light's spread at the part that is mirrored best.
+ */
+vec3 analytic_specular(Light light, Surface surface, vec3 position, vec3 normal, vec3 view)
+{
+#ifdef AREA_LIGHTS
+    if (light.kind == LIGHT_AREA)
+        return area_specular(light, surface, light.position - position, normal, view);
+#endif
+    return cone_specular(light_cone(light, position), surface, normal, view);
+}
+#endif

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Whether light arrives: lookups into the shadow maps that shaders/shadow_maps draws. Needs common/lights.glsl and
+// common/hash.glsl. Positions are camera-relative, m.
+
+#include "common/caster_plane.glsl"
+
+uniform usampler2DArray shadow_atlas;
+uniform sampler2D shadow_table; // six texels a map, see render/shadow_table.py
+
+// Planes of casters and receivers are known to this part of a texel or pixel: vertices are snapped to such a grid.
+const float SUBPIXEL = 1.0 / 128.0;
+// Rounding of positions that were computed in a few steps.
+const float POSITION_EPSILON = 4.0 * FLOAT_EPSILON;
+
+struct ShadowMap
+{
+    vec4 row_x;
+    vec4 row_y;
+    vec4 row_nearness;
+    vec4 row_w;
+    vec2 corner;        // lower left texel
+    float size;         // texels a side, 0: nothing is there
+    int page;
+    float texel;        // width at distance 1, orthographic: m
+    bool orthographic;
+};
+
+/** A receiver: where it is, its unit normal, and how exactly its position is known, m. */
+struct Receiver
+{
+    vec3 position;
+    vec3 normal;
+    float precision_along_view;
+};
+
+ShadowMap fetch_shadow_map(int index)
+{
+    ivec2 first = light_texel(index, TEXELS_PER_MAP);
+    vec4 place = texelFetch(shadow_table, first + ivec2(4, 0), 0);
+    vec4 optics = texelFetch(shadow_table, first + ivec2(5, 0), 0);
+    return ShadowMap(texelFetch(shadow_table, first, 0), texelFetch(shadow_table, first + ivec2(1, 0), 0),
+                     texelFetch(shadow_table, first + ivec2(2, 0), 0), texelFetch(shadow_table, first + ivec2(3, 0), 0),
+                     place.xy, place.z, int(place.w), optics.x, optics.y > 0.0);
+}
+
+/** Texel x, y of the map's page, and nearness: 1/z in perspective maps, z_end - z in orthographic ones. */
+vec3 to_map(ShadowMap map, vec3 position)
+{
+    vec4 point = vec4(position, 1.0);
+    return vec3(dot(map.row_x, point), dot(map.row_y, point), dot(map.row_nearness, point)) / dot(map.row_w, point);
+}
+
+/** Whether a point of the page is on the map, by `margin` texels. */
+bool on_map(ShadowMap map, vec2 point, float margin)
+{
+    vec2 inner = point - map.corner;
+    return all(greaterThanEqual(inner, vec2(margin))) && all(lessThanEqual(inner, vec2(map.size - margin)));
+}
+
+/** The caster nearest to the light in a texel: nearness at its centre, 0 where there is none, and change per texel. */
+vec3 fetch_caster(ShadowMap map, ivec2 texel)
+{
+    uvec2 plane = texelFetch(shadow_atlas, ivec3(texel, map.page), 0).rg;
+    float nearness = uintBitsToFloat(plane.x);
+    return vec3(nearness, decode_slope(plane.y) * slope_unit(map.orthographic, nearness, map.texel));
+}
+
+/** Metres along the light as a difference of nearness. */
+float nearness_of(ShadowMap map, float nearness, float metres)
+{
+    return map.orthographic ? metres : metres * nearness * nearness;
+}
+
+/**
+ * How far, as a difference of nearness, a receiver may seem nearer or farther than it is.
+ *
+ * Its place is off by `precision_along_view` and by rounding; light at a small angle makes more of it.
+ */
+float receiver_tolerance(ShadowMap map, Receiver receiver, float nearness, float n_dot_l)
+{
+    float place = receiver.precision_along_view + POSITION_EPSILON * length(receiver.position);
+    float rounding = map.orthographic ? abs(map.row_nearness.w) + nearness : nearness;
+    return nearness_of(map, nearness, place / max(n_dot_l, 0.02)) + POSITION_EPSILON * rounding;
+}
+
+/**
+ * Whether a texel's caster is before a receiver at `point`, in map space.
+ *
+ * The caster's plane is compared at the receiver's place and at the texel's centre: only what is before the receiver by
+ * both hides it, so that neither a tilted surface nor a neighbouring facet shadows what it touches.
+ */
+bool hides(ShadowMap map, ivec2 texel, vec3 point, float tolerance)
+{
+    vec3 caster = fetch_caster(map, texel);
+    float extrapolated = caster.x + dot(caster.yz, point.xy - (vec2(texel) + 0.5));
+    float allowance = tolerance + SUBPIXEL * (abs(caster.y) + abs(caster.z));
+    return min(caster.x, extrapolated) > point.z + allowance;
+}
+
+/** The map that a receiver is on, and its place there; false where no map shows it, so that light arrives. */
+bool find_map(LightPoint point, vec3 origin, vec3 position, out ShadowMap map, out vec3 place)
+{
+    if (point.shadow_count < 0) {
+        vec3 away = position - origin;
+        vec3 size = abs(away);
+        int axis = size.x >= size.y ? (size.x >= size.z ? 0 : 2) : (size.y >= size.z ? 1 : 2);
+        map = fetch_shadow_map(point.shadow_first + 2 * axis + (away[axis] < 0.0 ? 1 : 0));
+        place = to_map(map, position);
+        return map.size > 0.0;
+    }
+    for (int index = 0; index < point.shadow_count; ++index) {
+        map = fetch_shadow_map(point.shadow_first + index);
+        if (map.size == 0.0)
+            continue;
+        place = to_map(map, position);
+        // Behind a perspective map's light nothing is lit.
+        if (place.z > 0.0 && on_map(map, place.xy, 1.0))
+            return true;
+    }
+    return false;
+}
+
+/** The nearest texel of a map. */
+ivec2 texel_of(ShadowMap map, vec2 point)
+{
+    return ivec2(clamp(point, map.corner, map.corner + map.size - 1.0));
+}
+
+/** 1 where light from a sampled point (`origin`; of distant light unused) arrives, else 0. */
+float point_visibility(LightPoint point, vec3 origin, Receiver receiver, float n_dot_l)
+{
+    ShadowMap map;
+    vec3 place;
+    if (!find_map(point, origin, receiver.position, map, place))
+        return 1.0;
+    // Each sample rounds to the texel grid elsewhere: edges of shadows become smooth, even of lights without size.
+    ivec2 texel = texel_of(map, place.xy + shadow_jitter);
+    return hides(map, texel, place, receiver_tolerance(map, receiver, place.z, n_dot_l)) ? 0.0 : 1.0;
+}
+
+#ifdef PREVIEW
+const int BLOCKER_TAPS = 12;
+const int FILTER_TAPS = 20;
+// A search wider than this share of the map would find casters of other shadows.
+const float WIDEST_SEARCH = 0.1;
+// Casters nearer to the light than this share of the way are searched for less widely than they shadow.
+const float NEAREST_BLOCKER = 0.3;
+
+/** Taps that fill the unit disk evenly, turned by `turn` (Vogel's spiral). */
+vec2 disk_tap(int index, int count, float turn)
+{
+    float angle = 2.39996323 * float(index) + turn;
+    return sqrt((float(index) + 0.5) / float(count)) * vec2(cos(angle), sin(angle));
+}
+
+/** Change of a receiver's nearness per texel over its own plane; none where the plane is seen edge on. */
+vec2 receiver_gradient(ShadowMap map, Receiver receiver, vec3 place, float reach)
+{
+    vec3 tangent, bitangent;
+    orthonormal_basis(receiver.normal, tangent, bitangent);
+    float step_length = 0.01 * reach;
+    vec3 along = to_map(map, receiver.position + step_length * tangent) - place;
+    vec3 beside = to_map(map, receiver.position + step_length * bitangent) - place;
+    float area = along.x * beside.y - along.y * beside.x;
+    if (abs(area) < 1e-12)
+        return vec2(0.0);
+    return vec2(along.z * beside.y - along.y * beside.z, along.x * beside.z - along.z * beside.x) / area;
+}
+
+/**
+ * Share of a light of radius `radius` (m; of distant light the tangent of its angular radius) that a receiver sees: its
+ * blockers' mean distance gives the penumbra's width (Fernando 2005, "Percentage-Closer Soft Shadows").
+ */
+float soft_visibility(LightPoint point, vec3 origin, float radius, Receiver receiver, float n_dot_l, float turn)
+{
+    ShadowMap map;
+    vec3 place;
+    if (!find_map(point, origin, receiver.position, map, place))
+        return 1.0;
+    float reach = map.orthographic ? map.size * map.texel : length(receiver.position - origin);
+    vec2 gradient = receiver_gradient(map, receiver, place, reach);
+    float scale = radius / map.texel;
+    // Rays to the light's rim pass a blocker of nearness n at (n - n of the receiver) times this, in texels.
+    float widest = map.orthographic ? place.z + reach : place.z * (1.0 / NEAREST_BLOCKER - 1.0);
+    float search = clamp(scale * widest, 1.0, WIDEST_SEARCH * map.size);
+    float tolerance = receiver_tolerance(map, receiver, place.z, n_dot_l);
+    float blockers = 0.0, nearness = 0.0;
+    for (int tap = 0; tap < BLOCKER_TAPS; ++tap) {
+        vec2 offset = search * disk_tap(tap, BLOCKER_TAPS, turn);
+        ivec2 texel = texel_of(map, place.xy + offset);
+        vec3 there = vec3(place.xy + offset, place.z + dot(gradient, offset));
+        if (hides(map, texel, there, tolerance + SUBPIXEL * (abs(gradient.x) + abs(gradient.y)))) {
+            blockers += 1.0;
+            nearness += fetch_caster(map, texel).x;
+        }
+    }
+    if (blockers == 0.0)
+        return 1.0;
+    float penumbra = clamp(scale * max(nearness / blockers - place.z, 0.0), 0.75, WIDEST_SEARCH * map.size);
+    float lit = 0.0;
+    for (int tap = 0; tap < FILTER_TAPS; ++tap) {
+        vec2 offset = penumbra * disk_tap(tap, FILTER_TAPS, turn);
+        vec3 there = vec3(place.xy + offset, place.z + dot(gradient, offset));
+        bool hidden = hides(map, texel_of(map, there.xy), there,
+                            tolerance + SUBPIXEL * (abs(gradient.x) + abs(gradient.y)));
+        lit += hidden ? 0.0 : 1.0;
+    }
+    return lit / float(FILTER_TAPS);
+}
+#endif
