@@ -76,12 +76,12 @@ def channels(wanted: Iterable[OutputPass]) -> frozenset[Channel]:
 
 def images(wanted: Iterable[OutputPass], delivered: Mapping[Channel, Float32Array]) -> dict[str, Float32Array]:
     """(H, W, C) float32 of each pass by its name in the running Blender, from all its channels (H, W, C)."""
-    return {
-        item.name: delivered[item.channel]
-        if item.color is None
-        else over(delivered[item.channel], delivered[item.color])
-        for item in wanted
-    }
+    return {item.name: _image(item, delivered) for item in wanted}
+
+
+def _image(item: OutputPass, delivered: Mapping[Channel, Float32Array]) -> Float32Array:
+    pixels = delivered[item.channel]
+    return pixels if item.color is None else over(pixels, delivered[item.color])
 
 
 def over(light: Float32Array, color: Float32Array) -> Float32Array:

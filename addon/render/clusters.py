@@ -13,9 +13,10 @@ from ..scene.arrays import BoolArray, Float32Array, Float64Array, Int64Array, UI
 from .frustum import boxes_inside
 
 CLUSTER_TRIANGLES = 64
+"""The most that a cluster has."""
 
 _AXIS_BITS = 10
-_WIDEST_GAP = 1
+_INDEX_BITS = 32
 
 
 @dataclass(frozen=True)
@@ -23,40 +24,77 @@ class Clusters:
     """The triangles of a mesh, sorted into clusters of neighbours within each slot.
 
     `triangles` (T, 3) uint32: those of the mesh, in the mesh's slots, in another order.
-    `first` (C,): the first triangle of each cluster in ascending order; it ends where the next begins.
+    `first` (C,), `count` (C,): the triangles of each cluster, one after the other.
     `boxes` (C, 2, 3) float32: lowest and highest corner of each, object space.
     """
 
     triangles: UInt32Array
     first: Int64Array
+    count: Int64Array
     boxes: Float32Array
 
 
 def cluster(mesh: Mesh) -> Clusters:
-    """Sort a mesh's triangles along a Morton curve through their middles and cut it into clusters."""
-    corners = mesh.positions[mesh.triangles]
-    low, high = corners.min(axis=1), corners.max(axis=1)
+    """Sort a mesh's triangles along a Morton curve through their middles and cut it into clusters.
+
+    They are the largest cells of an octree that hold few enough: their boxes overlap far less than those of equal
+    stretches of the curve, and as little as those of a binary tree by the surface area heuristic.
+    """
+    low, high = _triangle_boxes(mesh)
     codes = _morton_codes(low + high, 2.0 * mesh.bounds)
-    order = np.argsort(codes | _slots(mesh) << 3 * _AXIS_BITS, kind="stable")
-    firsts = [np.arange(slot.first, slot.first + slot.count, CLUSTER_TRIANGLES) for slot in mesh.slots]
-    first = np.concatenate(firsts) if firsts else np.zeros(0, np.int64)
+    orders, firsts = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+    for slot in mesh.slots:
+        # The index in the lowest bits makes equal codes differ: any sort gives the same order.
+        keys = np.sort(codes[slot.first : slot.first + slot.count] << _INDEX_BITS | np.arange(slot.count))
+        orders.append(slot.first + (keys & (1 << _INDEX_BITS) - 1))
+        firsts.append(slot.first + _cuts(keys >> _INDEX_BITS))
+    order, first = np.concatenate(orders), np.concatenate(firsts)
+    count = np.diff(first, append=len(order))
     if len(order) == 0:
-        return Clusters(mesh.triangles, first, np.zeros((0, 2, 3), np.float32))
+        return Clusters(mesh.triangles, first, count, np.zeros((0, 2, 3), np.float32))
     boxes = [np.minimum.reduceat(low[order], first), np.maximum.reduceat(high[order], first)]
-    return Clusters(mesh.triangles[order], first, np.stack(boxes, axis=1))
+    return Clusters(mesh.triangles[order], first, count, np.stack(boxes, axis=1))
 
 
-def _slots(mesh: Mesh) -> Int64Array:
-    """(T,) the place of each triangle's slot among all."""
-    return np.repeat(np.arange(len(mesh.slots)), [slot.count for slot in mesh.slots])
+def placed_boxes(boxes: Float32Array, world_from_object: Float64Array) -> Float64Array:
+    """(C, 2, 3) float64, world space: boxes about boxes (C, 2, 3) of an object that is placed by a matrix (4, 4)."""
+    linear = world_from_object[:3, :3]
+    middles = boxes.mean(axis=1, dtype=np.float64) @ linear.T + world_from_object[:3, 3]
+    extents = 0.5 * (boxes[:, 1].astype(np.float64) - boxes[:, 0]) @ np.abs(linear).T
+    return np.stack([middles - extents, middles + extents], axis=1)
+
+
+def visible_runs(clusters: Clusters, planes: Float64Array) -> list[tuple[int, int]]:
+    """(first triangle, count) of the stretches of clusters that reach into half spaces (P, 4), object space."""
+    visible = boxes_inside(clusters.boxes.astype(np.float64), planes)
+    return runs(visible, clusters.first, clusters.count)
+
+
+def runs(chosen: BoolArray, first: Int64Array, count: Int64Array) -> list[tuple[int, int]]:
+    """(first, count) of the stretches of what is chosen (C,), where each follows the one before unless there is a gap."""
+    at = np.flatnonzero(chosen)
+    if len(at) == 0:
+        return []
+    ends = first[at] + count[at]
+    apart = np.flatnonzero(first[at[1:]] != ends[:-1]) + 1
+    starts = first[at[np.append(0, apart)]]
+    return list(zip(starts.tolist(), (ends[np.append(apart - 1, -1)] - starts).tolist(), strict=True))
+
+
+def _triangle_boxes(mesh: Mesh) -> tuple[Float32Array, Float32Array]:
+    """Lowest and highest corner (T, 3) of each triangle."""
+    a, b, c = (mesh.positions[corner] for corner in mesh.triangles.T)
+    return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
 
 def _morton_codes(points: Float32Array, bounds: Float64Array) -> Int64Array:
     """(N,) the bits of the coordinates (N, 3) in turn, as shares of the longest side of bounds (2, 3)."""
-    side = max(float((bounds[1] - bounds[0]).max()), np.finfo(np.float32).tiny)
-    steps = ((points - bounds[0].astype(np.float32)) * np.float32((1 << _AXIS_BITS) / side)).astype(np.int64)
-    x, y, z = (_spread(axis) for axis in np.clip(steps, 0, (1 << _AXIS_BITS) - 1).T)
-    return x | y << 1 | z << 2
+    side = max(float((bounds[1] - bounds[0]).max()), 1e-30)
+    codes = np.zeros(len(points), np.int64)
+    for axis in range(3):
+        share = (points[:, axis] - np.float32(bounds[0, axis])) * np.float32((1 << _AXIS_BITS) / side)
+        codes |= _spread(np.clip(share, 0.0, (1 << _AXIS_BITS) - 1).astype(np.int64)) << axis
+    return codes
 
 
 def _spread(values: Int64Array) -> Int64Array:
@@ -64,3 +102,18 @@ def _spread(values: Int64Array) -> Int64Array:
     for shift, mask in ((16, 0x030000FF), (8, 0x0300F00F), (4, 0x030C30C3), (2, 0x09249249)):
         values = (values | values << shift) & mask
     return values
+
+
+def _cuts(codes: Int64Array) -> Int64Array:
+    """(C,) where clusters begin among ascending Morton codes (N,): at cells' borders, and inside cells that are full."""
+    differing = np.frexp((codes[1:] ^ codes[:-1]).astype(np.float64))[1].astype(np.int8)  # bits up to the highest
+    starts = np.zeros(min(len(codes), 1), np.int64)
+    for level in range(3 * _AXIS_BITS, 0, -1):
+        large = np.diff(starts, append=len(codes)) > CLUSTER_TRIANGLES
+        if not large.any():
+            return starts
+        borders = np.flatnonzero(differing == level) + 1
+        starts = np.sort(np.append(starts, borders[large[np.searchsorted(starts, borders, side="right") - 1]]))
+    pieces = -(-np.diff(starts, append=len(codes)) // CLUSTER_TRIANGLES)
+    piece = np.arange(pieces.sum()) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    return np.repeat(starts, pieces) + CLUSTER_TRIANGLES * piece

@@ -17,6 +17,9 @@ KIND_CODES = {LightKind.POINT: 0, LightKind.SUN: 1, LightKind.SPOT: 2, LightKind
 MESH_CODE = 4
 WORLD_CODE = 5
 _SHAPE_CODES = {AreaShape.RECTANGLE: 0, AreaShape.ELLIPSE: 1}
+GREATEST_EMISSION = 1e30
+"""Brighter lights would be infinite in float32 once they are near something."""
+
 _NARROWEST_SOFT_EDGE = 1e-6
 FULL_SPREAD = np.pi - 1e-4
 """Emission angle (rad) of area lights from which on they emit all around."""
@@ -39,7 +42,7 @@ def light_rows(lights: Sequence[Light], origin: Float64Array) -> Float32Array:
         rotation = light.world_from_light[:3, :3]
         row[0] = (*(light.world_from_light[:3, 3] - origin), KIND_CODES[light.kind])
         row[1] = (*-rotation[:, 2], 0.5 * light.angle if light.kind is LightKind.SUN else light.radius)
-        row[2, :3] = light.emission
+        row[2, :3] = np.minimum(light.emission, GREATEST_EMISSION)
         if light.kind is LightKind.SPOT:
             cosine = np.cos(0.5 * light.angle)
             row[2, 3] = cosine
@@ -64,7 +67,8 @@ def mesh_light_rows(lights: Sequence[MeshLight]) -> Float32Array:
     """
     rows = np.zeros((len(lights), TEXELS_PER_LIGHT, 4), np.float32)
     for row, light in zip(rows, lights, strict=True):
-        row[0, 3], row[1, 3], row[2, :3] = MESH_CODE, light.area, light.emission
+        row[0, 3], row[1, 3] = MESH_CODE, light.area
+        row[2, :3] = np.minimum(light.emission, GREATEST_EMISSION)
         row[5] = (1.0, 1.0, light.front, light.back)
         row[6] = _group_words(ALL_GROUPS)
     return rows

@@ -13,7 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..scene.arrays import Color, Float64Array
+from ..scene.arrays import BoolArray, Float64Array
 from ..scene.equirectangular import interpolated
 
 SMALLEST_SUN = 0.0005
@@ -34,7 +34,7 @@ class Air:
 class Sky:
     """A physical sky. `sun_elevation`, `sun_rotation` (clockwise from +Y seen from above), rad.
 
-    `rgb_from_xyz` (3, 3), row by row: scene-linear colour of CIE XYZ. `multiple`: light may be scattered more than once.
+    `rgb_from_xyz` (3, 3), row by row: scene-linear colour of CIE XYZ. `multiple`: light is scattered more than once.
     `before_5`: shown as Cycles did before Blender 5.0, where rows near the horizon differ a little.
     """
 
@@ -76,6 +76,42 @@ _GROUND_FADE = -0.4  # z of directions below which there is nothing
 _TABLE_COLUMNS, _TABLE_ROWS = 512, 128
 _OUR_COLUMNS = 33  # from the sun to opposite of it: without the phase functions, radiance varies slowly
 
+_SPECTRUM = np.array(
+    # From 380 to 780 nm: irradiance of the sun above the atmosphere, W/(m²·nm); Rayleigh scattering at sea level, 1/m;
+    # absorption where ozone is densest, 1/m; CIE 1931 2° colour matching functions x, y, z.
+    [
+        (1.457568299, 5.424820088e-05, 3.251268499e-09, 0.001368, 0.000039, 0.006450001),
+        (1.565963056, 4.418549867e-05, 5.853953650e-09, 0.01431, 0.000396, 0.06785001),
+        (1.651484491, 3.635151910e-05, 1.977191155e-08, 0.13438, 0.004, 0.6456),
+        (1.714962427, 3.017929012e-05, 7.309568763e-08, 0.34828, 0.023, 1.74706),
+        (1.757979838, 2.526320227e-05, 2.008456151e-07, 0.2908, 0.06, 1.6692),
+        (1.782564079, 2.130859311e-05, 4.038395810e-07, 0.09564, 0.13902, 0.8129501),
+        (1.790951085, 1.809838025e-05, 6.355133591e-07, 0.0049, 0.323, 0.272),
+        (1.785415501, 1.547057129e-05, 9.670704118e-07, 0.06327, 0.71, 0.07824999),
+        (1.768155549, 1.330284977e-05, 1.547974004e-06, 0.2904, 0.954, 0.0203),
+        (1.741220696, 1.150184784e-05, 2.090386472e-06, 0.5945, 0.995, 0.0039),
+        (1.706471272, 9.995574300e-06, 2.461280562e-06, 0.9163, 0.87, 0.001650001),
+        (1.665560875, 8.727999736e-06, 2.735512995e-06, 1.0622, 0.631, 0.0008),
+        (1.619934372, 7.655137010e-06, 2.151258631e-06, 0.8544499, 0.381, 0.00019),
+        (1.570835974, 6.742172038e-06, 1.590518408e-06, 0.4479, 0.175, 0.00002),
+        (1.519323351, 5.961341258e-06, 1.123561980e-06, 0.1649, 0.061, 0),
+        (1.466284950, 5.290345981e-06, 7.352755149e-07, 0.04677, 0.017, 0),
+        (1.412458527, 4.711156876e-06, 4.645013036e-07, 0.01135916, 0.004102, 0),
+        (1.358449620, 4.209104811e-06, 3.309607992e-07, 0.002899327, 0.001047, 0),
+        (1.304749138, 3.772183813e-06, 2.251261229e-07, 0.0006900786, 0.0002492, 0),
+        (1.251749633, 3.390512555e-06, 1.487912927e-07, 0.0001661505, 0.00006, 0),
+        (1.199759988, 3.055915317e-06, 1.682862336e-07, 0.00004150994, 0.00001499, 0),
+    ]
+)
+_WAVELENGTH_STEP = 20.0  # nm
+_IRRADIANCE, _RAYLEIGH, _OZONE = _SPECTRUM[:, :3].T
+_EXTINCTION = 2e-5, 1.11 * 2e-5  # 1/m at sea level
+_MIE_ASYMMETRY = 0.76
+_STEPS = 32  # along a view ray
+_GROUND_FADE = -0.4  # z of directions below which there is nothing
+_TABLE_COLUMNS, _TABLE_ROWS = 512, 128
+_OUR_COLUMNS = 33  # from the sun to opposite of it: without the phase functions, radiance varies slowly
+
 _WAVELENGTH_STEP = 20.0  # nm, from 380 to 780
 _IRRADIANCE = np.array(
     # Of the sun above the atmosphere, W/(m²·nm).
@@ -104,16 +140,7 @@ _OZONE = np.array(
     float,
 )
 _EXTINCTION = np.stack([_RAYLEIGH, np.full_like(_RAYLEIGH, _MIE_EXTINCTION), _OZONE])
-_COLOR_MATCHING = np.array(
-    # CIE 1931 2° standard observer: x, y, z.
-    """0.001368 0.000039 0.006450001  0.01431 0.000396 0.06785001  0.13438 0.004 0.6456  0.34828 0.023 1.74706
-    0.2908 0.06 1.6692  0.09564 0.13902 0.8129501  0.0049 0.323 0.272  0.06327 0.71 0.07824999
-    0.2904 0.954 0.0203  0.5945 0.995 0.0039  0.9163 0.87 0.001650001  1.0622 0.631 0.0008
-    0.8544499 0.381 0.00019  0.4479 0.175 0.00002  0.1649 0.061 0  0.04677 0.017 0  0.01135916 0.004102 0
-    0.002899327 0.001047 0  0.0006900786 0.0002492 0  0.0001661505 0.00006 0  0.00004150994 0.00001499 0""".split(),
-    float,
-).reshape(-1, 3)
-_XYZ_FROM_IRRADIATED = _IRRADIANCE[:, None] * _COLOR_MATCHING * _WAVELENGTH_STEP
+_XYZ_FROM_IRRADIATED = _IRRADIANCE[:, None] * _SPECTRUM[:, 3:] * _WAVELENGTH_STEP
 
 # Gauss–Laguerre quadrature with 8 nodes, cut at 25 e-foldings: optical depths fall off exponentially along a ray.
 _LAGUERRE_NODES, _LAGUERRE_WEIGHTS = np.polynomial.laguerre.laggauss(8)
@@ -195,7 +222,7 @@ def _scattered_once(rays: Float64Array, sun: Float64Array, air: Air) -> Float64A
         points = origin + ((index + 0.5) * step)[:, None] * rays
         amount = _densities(np.linalg.norm(points, axis=-1) - _EARTH_RADIUS) * densities * step[:, None]
         depth += amount
-        lit = ~_earth_hides(points, sun)
+        lit = _sun_reaches(points, sun)
         transmitted = np.zeros((len(rays), len(_RAYLEIGH)))
         to_sun = _optical_depths(points[lit], sun[None]) * densities
         transmitted[lit] = np.exp(-(depth[lit] + to_sun) @ _EXTINCTION)
@@ -217,10 +244,10 @@ def _distance_to_space(points: Float64Array, rays: Float64Array) -> Float64Array
     return np.sqrt(along**2 - np.sum(points**2, axis=-1) + _ATMOSPHERE_RADIUS**2) - along
 
 
-def _earth_hides(points: Float64Array, sun: Float64Array) -> Float64Array:
-    """(n,) whether the Earth lies between points (n, 3) and the sun (3,)."""
+def _sun_reaches(points: Float64Array, sun: Float64Array) -> BoolArray:
+    """(n,) whether the Earth does not lie between points (n, 3) and the sun (3,)."""
     along = points @ sun
-    return (sun[2] < 0.0) & (along**2 >= np.sum(points**2, axis=-1) - _EARTH_RADIUS**2)
+    return (sun[2] >= 0.0) | (along**2 < np.sum(points**2, axis=-1) - _EARTH_RADIUS**2)
 
 
 def _optical_depths(points: Float64Array, rays: Float64Array) -> Float64Array:

@@ -69,33 +69,38 @@ class WorldTable:
         world = view_layer.world_override or scene.world
         if world is None or not view_layer.use_sky:
             return World(), ()
-        rays = _ray_visibility(world)
+        black = _black(world)
         if not has_nodes(world):
             red, green, blue = world.color
-            return World((red, green, blue), **rays), ()
+            return replace(black, radiance=(red, green, blue)), ()
         evaluator = WorldEvaluator(f"World “{world.name}”", images)
         radiance = _radiance(world.node_tree, evaluator)
-        lights = _suns(radiance, world.name, rays, evaluator)
-        mirrored = self._mirror(world.name, radiance, rays)
+        lights = _suns(radiance, world.name, black, evaluator)
+        mirrored = self._mirror(world.name, radiance, black)
         messages.extend(_KEY, evaluator.warnings)
         return mirrored, lights
 
-    def _mirror(self, name: str, radiance: Field, rays: dict[str, bool]) -> World:
+    def _mirror(self, name: str, radiance: Field, black: World) -> World:
         factor, shown = split_factor(radiance)
         if isinstance(shown, Constant):
             self._map = None
-            return World(_limited(np.multiply(factor, shown.value)), **rays)
+            return replace(black, radiance=_limited(np.multiply(factor, shown.value)))
         frame = _frame(shown)
-        plain = isinstance(shown, EnvironmentImage) and frame.rotation is not None
-        content = shown.parameters if plain else signature(shown)
+        plain = shown if isinstance(shown, EnvironmentImage) and frame.rotation is not None else None
+        content = plain.parameters if plain else signature(shown)
         if self._map is None or self._content != content:
-            pixels = shown.pixels if plain else _pixels(shown, frame)
+            pixels = plain.pixels if plain else _pixels(shown, frame)
             self._map = EnvironmentMap(_KEY, name, new_version(), pixels)
             self._content = content
         elif self._map.name != name:
             self._map = replace(self._map, name=name)
         unturned = frame.rotation is None or np.allclose(frame.rotation, np.eye(3), atol=1e-7)
-        return World(_limited(np.array(factor)), self._map, None if unturned else frame.rotation, **rays)
+        return replace(
+            black,
+            radiance=_limited(np.array(factor)),
+            environment=self._map,
+            environment_from_world=None if unturned else frame.rotation,
+        )
 
 
 def _radiance(tree: Any, evaluator: WorldEvaluator) -> Field:
@@ -107,9 +112,12 @@ def _radiance(tree: Any, evaluator: WorldEvaluator) -> Field:
     return evaluator.radiance(output.inputs["Surface"], ())
 
 
-def _ray_visibility(world: Any) -> dict[str, bool]:
+def _black(world: Any) -> World:
+    """A world without radiance that is seen by the same rays as Blender's."""
     rays = getattr(world, "cycles_visibility", None)
-    return {f"seen_by_{kind}": rays is None or getattr(rays, kind) for kind in ("camera", "diffuse", "glossy")}
+    if rays is None:
+        return World()
+    return World(seen_by_camera=rays.camera, seen_by_diffuse=rays.diffuse, seen_by_glossy=rays.glossy)
 
 
 def _limited(color: Float64Array) -> Color:
@@ -143,7 +151,7 @@ def _pixels(shown: Field, frame: _Frame) -> Float32Array:
     return pixels
 
 
-def _suns(radiance: Field, name: str, rays: dict[str, bool], evaluator: WorldEvaluator) -> tuple[Light, ...]:
+def _suns(radiance: Field, name: str, black: World, evaluator: WorldEvaluator) -> tuple[Light, ...]:
     """The suns of the skies in a world: lights, as far as the world is a sum of skies."""
     shares = {id(part): share for part, share in linear_shares(radiance)}
     lights: list[Light] = []
@@ -154,11 +162,10 @@ def _suns(radiance: Field, name: str, rays: dict[str, bool], evaluator: WorldEva
         if share is None or rotation is None:
             evaluator.tell("the sun of a sky whose colour or vector is changed is not rendered yet; it is left out")
             continue
-        if rays["seen_by_camera"]:
+        if black.seen_by_camera:
             evaluator.tell("the sun's disc lights the scene but is not seen in the background yet")
         color = _limited(np.array(share) * part.sun_intensity)
         light = sun_light(f"{_KEY}/sun{len(lights) or ''}", name, part.sky, part.sun_size, color, rotation)
-        lights.append(
-            replace(light, diffuse_factor=float(rays["seen_by_diffuse"]), specular_factor=float(rays["seen_by_glossy"]))
-        )
+        seen = {"diffuse_factor": float(black.seen_by_diffuse), "specular_factor": float(black.seen_by_glossy)}
+        lights.append(replace(light, **seen))
     return tuple(lights)

@@ -31,10 +31,9 @@ class PerNumber:
     def __call__(self, *arrays: Float64Array) -> Float64Array:
         """All at once where the operation is plain arithmetic, otherwise one by one; NaN where there is no result."""
         try:
-            result = np.asarray(self.operation(*arrays), np.float64)
+            return np.asarray(self.operation(*arrays), np.float64)
         except (TypeError, ValueError):  # numpy refuses whatever branches
-            result = np.frompyfunc(self._one, len(arrays), 1)(*arrays).astype(np.float64)
-        return result
+            return np.asarray(np.frompyfunc(self._one, len(arrays), 1)(*arrays), np.float64)
 
     def _one(self, *numbers: float) -> float:
         try:

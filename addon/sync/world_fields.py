@@ -22,7 +22,7 @@ from .sky_multiple import multiple_scattering_radiance
 from .sky_preetham import PreethamSky, preetham_radiance
 
 Operation = Callable[..., Float64Array]
-"""Of arrays (n, 3), or (1, 3) where all directions have one value, to another one; equal operations compute the same."""
+"""Of arrays (n, 3), or (1, 3) where all directions have one value, to another such; equal ones compute the same."""
 
 LARGEST_WIDTH = 4096
 """Texels of a map from left to right; larger images are halved until they fit."""

@@ -68,9 +68,11 @@ class WorldEvaluator:
             return result
         return computed(mean_value if source.socket.type == "VECTOR" else as_value, result)
 
-    def vector(self, source: Source, name: str = "Vector") -> Field:
-        """A vector input of a node; the direction itself where nothing is connected, or nothing that can be read."""
-        socket = source.node.inputs[name]
+    def vector(self, source: Source) -> Field:
+        """The vector input of a texture; the direction itself where nothing that can be read is connected to one."""
+        socket = source.node.inputs.get("Vector")
+        if socket is None:
+            return DIRECTION
         linked = find_source(socket, source.groups)
         if linked.node is not None and not linked.node.mute and linked.node.bl_idname not in _READERS:
             self.warn(linked.node, f"{linked.node.bl_label} is not rendered yet; the direction itself is used instead")
@@ -144,9 +146,8 @@ def _sky_texture(source: Source, evaluator: WorldEvaluator) -> Field:
 
 def _rgb_from_xyz() -> tuple[float, ...]:
     """(3, 3), row by row: scene-linear colours of CIE XYZ, in whatever colour space Blender works."""
-    axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    columns = [tuple(mathutils.Color(axis).from_xyz_d65_to_scene_linear()) for axis in axes]
-    return tuple(column[row] for row in range(3) for column in columns)
+    columns = [mathutils.Color(axis).from_xyz_d65_to_scene_linear() for axis in np.eye(3)]
+    return tuple(float(column[row]) for row in range(3) for column in columns)
 
 
 Reader = Callable[[Source, WorldEvaluator], Field]

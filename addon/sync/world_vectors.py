@@ -154,7 +154,7 @@ _VECTOR_MATH: dict[str, Operation] = {
     "SCALE": multiply,
     "NORMALIZE": lambda a: np.where(np.any(a != 0.0, axis=-1, keepdims=True), normalized(a), 0.0),
     "DOT_PRODUCT": lambda a, b: _scalar(np.sum(a * b, axis=-1)),
-    "CROSS_PRODUCT": lambda a, b: np.cross(a, b),
+    "CROSS_PRODUCT": np.cross,
     "LENGTH": lambda a: _scalar(np.linalg.norm(a, axis=-1)),
     "ABSOLUTE": np.abs,
     "MINIMUM": np.minimum,

@@ -6,11 +6,14 @@ import os
 import platform
 import subprocess
 import sys
+import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from tooling import environments
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 SHARED = REPOSITORY.parent / "shared" / "scenes"
@@ -46,6 +49,32 @@ def snapshots(blend: Path, frames: Sequence[int], resolution: tuple[int, int], s
     command += ["--frames", f"{frames[0]}-{frames[-1]}"]
     subprocess.run(command, env={**os.environ, "LIBGL_ALWAYS_SOFTWARE": "1"}, check=True, stdout=subprocess.DEVNULL)
     return sorted(scratch.glob(f"{blend.stem}_*_snapshot.npz"))
+
+
+def picture(
+    blend: Path, engine: str, output: Path, resolution: tuple[int, int], samples: int, settings: Mapping[str, object]
+) -> Path:
+    """Render a .blend with some of the engine's settings changed, through the file's view transform, to `output`."""
+    command = [sys.executable, str(REPOSITORY / "build.py"), "render", str(blend), "-o", str(output)]
+    command += ["--engine", engine, "--resolution", "{}x{}".format(*resolution), "--samples", str(samples)]
+    command += [part for name, value in settings.items() for part in ("--set", f"{name}={value}")]
+    surroundings = {**os.environ, "LIBGL_ALWAYS_SOFTWARE": "1"}
+    subprocess.run(command, env=surroundings, check=True, stdout=subprocess.DEVNULL)
+    return output
+
+
+def in_blender(script: Path, *arguments: str) -> None:
+    """Run a script in the newest Blender's Python, with a Blender profile of its own."""
+    with tempfile.TemporaryDirectory(prefix="deep_gbuffer_bench_") as profile:
+        paths = os.pathsep.join([str(REPOSITORY), str(REPOSITORY / "blender_tests" / "blender")])
+        surroundings = {
+            **os.environ,
+            "LIBGL_ALWAYS_SOFTWARE": "1",
+            "BLENDER_USER_RESOURCES": profile,
+            "PYTHONPATH": paths,
+        }
+        command = [str(environments.blender_python()), "-P", str(script), *arguments]
+        subprocess.run(command, env=surroundings, check=True)
 
 
 def machine() -> str:

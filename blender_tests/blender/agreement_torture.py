@@ -22,14 +22,14 @@ def sun(scene: bpy.types.Scene, elevation: float, azimuth: float, angle: float) 
     lamp(scene, "SUN", place, (0.0, 0.0, 0.0), energy=3.0, angle=math.radians(angle))
 
 
-def grazing_sun() -> bpy.types.Scene:
+def grazing_sun(width: int = WIDTH, height: int = HEIGHT) -> bpy.types.Scene:
     """Smooth waves and a ball of few faces under a sun 4° above the horizon."""
-    scene = empty_scene(WIDTH, HEIGHT)
+    scene = empty_scene(width, height)
     count = 48
     heights = np.linspace(-2.0, 2.0, count + 1)
     vertices = [(x, y, 0.08 * math.sin(4.0 * x) * math.cos(3.0 * y)) for y in heights for x in heights]
-    rows = [(row * (count + 1) + column, count + 1) for row in range(count) for column in range(count)]
-    faces = [(first, first + 1, first + width + 1, first + width) for first, width in rows]
+    corners = [row * (count + 1) + column for row in range(count) for column in range(count)]
+    faces = [(first, first + 1, first + count + 2, first + count + 1) for first in corners]
     waves = mesh_object("Waves", vertices, faces, MATTE)
     waves.data.shade_smooth()
     sphere(0.4, material("Ball", WALL), (0.6, 0.3, 0.5), segments=24)
@@ -38,9 +38,9 @@ def grazing_sun() -> bpy.types.Scene:
     return scene
 
 
-def narrow_gap() -> bpy.types.Scene:
+def narrow_gap(width: int = WIDTH, height: int = HEIGHT) -> bpy.types.Scene:
     """A box 1 mm above the ground, 3 cm of its edge, so that the gap is three pixels high."""
-    scene = empty_scene(WIDTH, HEIGHT)
+    scene = empty_scene(width, height)
     plane(4.0, material("Ground", MATTE))
     box(0.5, material("Box", WALL), (0.0, 0.25, 0.251))
     lamp(scene, "POINT", (-0.7, -0.9, 0.45), energy=20.0, shadow_soft_size=0.02)
@@ -48,9 +48,9 @@ def narrow_gap() -> bpy.types.Scene:
     return scene
 
 
-def leaf_card() -> bpy.types.Scene:
+def leaf_card(width: int = WIDTH, height: int = HEIGHT) -> bpy.types.Scene:
     """A leaf that is a texture's alpha on a square, its shadow on the wall behind it."""
-    scene = empty_scene(WIDTH, HEIGHT)
+    scene = empty_scene(width, height)
     plane(4.0, material("Wall", WALL), (0.0, 0.5, 0.0), (math.radians(90.0), 0.0, 0.0))
     plane(0.9, leaf(), (-0.1, 0.0, 0.0), (math.radians(90.0), 0.0, math.radians(15.0)))
     lamp(scene, "POINT", (-0.7, -1.6, 0.5), energy=50.0, shadow_soft_size=0.05)
@@ -78,9 +78,9 @@ def leaf() -> bpy.types.Material:
     return result
 
 
-def lampshade() -> bpy.types.Scene:
+def lampshade(width: int = WIDTH, height: int = HEIGHT) -> bpy.types.Scene:
     """A lamp inside a cone without thickness that is open above and below, between a floor, a wall and a box."""
-    scene = empty_scene(WIDTH, HEIGHT)
+    scene = empty_scene(width, height)
     plane(6.0, material("Floor", MATTE))
     plane(6.0, material("Wall", WALL), (0.0, 0.8, 0.0), (math.radians(90.0), 0.0, 0.0))
     box(0.4, material("Box", MATTE), (0.9, 0.2, 0.2), 0.4)
@@ -93,9 +93,9 @@ def lampshade() -> bpy.types.Scene:
     return scene
 
 
-def caster_behind_the_camera() -> bpy.types.Scene:
+def caster_behind_the_camera(width: int = WIDTH, height: int = HEIGHT) -> bpy.types.Scene:
     """Poles and a beam behind the camera, whose shadows are all that is seen of them."""
-    scene = empty_scene(WIDTH, HEIGHT)
+    scene = empty_scene(width, height)
     plane(12.0, material("Ground", MATTE))
     surface = material("Pole", WALL)
     for x in (-1.2, 0.1, 1.0):
@@ -106,9 +106,9 @@ def caster_behind_the_camera() -> bpy.types.Scene:
     return scene
 
 
-def kilometre() -> bpy.types.Scene:
+def kilometre(width: int = WIDTH, height: int = HEIGHT) -> bpy.types.Scene:
     """A kilometre of ground with towers in the distance, and blades of 4 cm an arm's length away."""
-    scene = empty_scene(WIDTH, HEIGHT)
+    scene = empty_scene(width, height)
     plane(1000.0, material("Ground", MATTE))
     surface = material("Tower", WALL)
     for x, y in ((-60.0, 180.0), (40.0, 120.0), (110.0, 330.0)):
@@ -137,3 +137,13 @@ def mesh_object(name: str, vertices: Any, faces: Any, values: dict[str, Any]) ->
     result = bpy.data.objects.new(name, mesh)
     bpy.context.scene.collection.objects.link(result)
     return result
+
+
+TORTURE = {
+    "grazing sun over curved meshes": grazing_sun,
+    "gap of 1 mm under a box": narrow_gap,
+    "leaf card in front of a wall": leaf_card,
+    "light inside a lampshade": lampshade,
+    "caster behind the camera": caster_behind_the_camera,
+    "sun over a kilometre": kilometre,
+}

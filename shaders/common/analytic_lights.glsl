@@ -7,8 +7,9 @@
 
 // Angular size below which a light's directions count as one: the error of that is of second order.
 const float SMALLEST_ANGLE = 0.01;
-// A highlight of a light is that of its centre below this share of the lobe's width, and the whole light's above that.
-const vec2 POINT_TO_SOLID = vec2(0.1, 0.3);
+// Angular size over GGX's α, half the width of its lobe: up to the first, a highlight is that of the light's centre, and
+// from the second on the whole light's.
+const vec2 POINT_TO_SOLID = vec2(0.03, 0.1);
 
 /** A cone of directions in which radiance is uniform. */
 struct LightCone
@@ -192,15 +193,9 @@ vec3 reflected_polygon(Surface surface, Polygon polygon, vec3 normal, vec3 view)
     return lobe.share * mix(by_mean, surface.specular_albedo, lobe.share);
 }
 
-/** Half the angle in which a lobe reflects most, rad. */
-float lobe_width(Surface surface)
-{
-    return surface.alpha;
-}
-
 vec3 cone_specular(LightCone cone, Surface surface, vec3 normal, vec3 view)
 {
-    float solid = smoothstep(POINT_TO_SOLID.x, POINT_TO_SOLID.y, cone.sine / lobe_width(surface));
+    float solid = smoothstep(POINT_TO_SOLID.x, POINT_TO_SOLID.y, cone.sine / surface.alpha);
     vec3 reflected = vec3(0.0);
     if (solid < 1.0)
         reflected = specular_brdf_cosine(surface, normal, view, cone.direction) * (1.0 - solid);
@@ -232,7 +227,7 @@ vec3 area_specular(Light light, Surface surface, vec3 center, vec3 normal, vec3 
 {
     if (!shines_on(light, center))
         return vec3(0.0);
-    float solid = smoothstep(POINT_TO_SOLID.x, POINT_TO_SOLID.y, angular_size(light, center) / lobe_width(surface));
+    float solid = smoothstep(POINT_TO_SOLID.x, POINT_TO_SOLID.y, angular_size(light, center) / surface.alpha);
     vec3 reflected = vec3(0.0);
     if (solid < 1.0)
         reflected = specular_brdf_cosine(surface, normal, view, normalize(center))

@@ -84,17 +84,32 @@ float receiver_tolerance(ShadowMap map, Receiver receiver, float nearness, float
 }
 
 /**
+ * Change per texel of the nearness of a receiver's tangent plane. `distance`: to the light, m; 1 in orthographic maps.
+ *
+ * On the plane through q with normal n a ray r from the light has n·r z = n·q: 1/z changes with the ray as n does.
+ */
+vec2 receiver_gradient(ShadowMap map, vec3 normal, float n_dot_l, float distance)
+{
+    vec3 forward = map.row_w.xyz; // 0 in orthographic maps, whose rows have nothing of it
+    float along = dot(normal, forward);
+    vec2 aside = vec2(dot(normal, map.row_x.xyz) - along * dot(forward, map.row_x.xyz),
+                      dot(normal, map.row_y.xyz) - along * dot(forward, map.row_y.xyz));
+    return -map.texel * map.texel * aside / (max(n_dot_l, 0.02) * distance);
+}
+
+/**
  * Whether a texel's caster is before a receiver at `point`, in map space.
  *
- * The caster's plane is compared at the receiver's place and at the texel's centre: only what is before the receiver by
- * both hides it, so that neither a tilted surface nor a neighbouring facet shadows what it touches.
+ * Only what is before the receiver by both planes hides it: the caster's, at the receiver's place, and the receiver's, at
+ * the texel's centre. So neither a tilted surface nor a neighbouring facet shadows what it touches.
  */
-bool hides(ShadowMap map, ivec2 texel, vec3 point, float tolerance)
+bool hides(ShadowMap map, ivec2 texel, vec3 point, vec2 gradient, float tolerance)
 {
     vec3 caster = fetch_caster(map, texel);
-    float extrapolated = caster.x + dot(caster.yz, point.xy - (vec2(texel) + 0.5));
-    float allowance = tolerance + SUBPIXEL * (abs(caster.y) + abs(caster.z));
-    return min(caster.x, extrapolated) > point.z + allowance;
+    vec2 offset = point.xy - (vec2(texel) + 0.5);
+    float before = min(dot(caster.yz, offset), dot(gradient, offset));
+    float allowance = tolerance + SUBPIXEL * (abs(caster.y) + abs(caster.z) + abs(gradient.x) + abs(gradient.y));
+    return caster.x > 0.0 && caster.x + before > point.z + allowance;
 }
 
 /** The map that a receiver is on, and its place there; false where no map shows it, so that light arrives. */
@@ -135,7 +150,9 @@ float point_visibility(LightPoint point, vec3 origin, Receiver receiver, float n
         return 1.0;
     // Each sample rounds to the texel grid elsewhere: edges of shadows become smooth, even of lights without size.
     ivec2 texel = texel_of(map, place.xy + shadow_jitter);
-    return hides(map, texel, place, receiver_tolerance(map, receiver, place.z, n_dot_l)) ? 0.0 : 1.0;
+    float distance = map.orthographic ? 1.0 : length(receiver.position - origin);
+    vec2 gradient = receiver_gradient(map, receiver.normal, n_dot_l, distance);
+    return hides(map, texel, place, gradient, receiver_tolerance(map, receiver, place.z, n_dot_l)) ? 0.0 : 1.0;
 }
 
 #ifdef PREVIEW
@@ -153,20 +170,6 @@ vec2 disk_tap(int index, int count, float turn)
     return sqrt((float(index) + 0.5) / float(count)) * vec2(cos(angle), sin(angle));
 }
 
-/** Change of a receiver's nearness per texel over its own plane; none where the plane is seen edge on. */
-vec2 receiver_gradient(ShadowMap map, Receiver receiver, vec3 place, float reach)
-{
-    vec3 tangent, bitangent;
-    orthonormal_basis(receiver.normal, tangent, bitangent);
-    float step_length = 0.01 * reach;
-    vec3 along = to_map(map, receiver.position + step_length * tangent) - place;
-    vec3 beside = to_map(map, receiver.position + step_length * bitangent) - place;
-    float area = along.x * beside.y - along.y * beside.x;
-    if (abs(area) < 1e-12)
-        return vec2(0.0);
-    return vec2(along.z * beside.y - along.y * beside.z, along.x * beside.z - along.z * beside.x) / area;
-}
-
 /**
  * Share of a light of radius `radius` (m; of distant light the tangent of its angular radius) that a receiver sees: its
  * blockers' mean distance gives the penumbra's width (Fernando 2005, "Percentage-Closer Soft Shadows").
@@ -177,11 +180,11 @@ float soft_visibility(LightPoint point, vec3 origin, float radius, Receiver rece
     vec3 place;
     if (!find_map(point, origin, receiver.position, map, place))
         return 1.0;
-    float reach = map.orthographic ? map.size * map.texel : length(receiver.position - origin);
-    vec2 gradient = receiver_gradient(map, receiver, place, reach);
+    float distance = map.orthographic ? 1.0 : length(receiver.position - origin);
+    vec2 gradient = receiver_gradient(map, receiver.normal, n_dot_l, distance);
     float scale = radius / map.texel;
     // Rays to the light's rim pass a blocker of nearness n at (n - n of the receiver) times this, in texels.
-    float widest = map.orthographic ? place.z + reach : place.z * (1.0 / NEAREST_BLOCKER - 1.0);
+    float widest = map.orthographic ? map.size * map.texel : place.z * (1.0 / NEAREST_BLOCKER - 1.0);
     float search = clamp(scale * widest, 1.0, WIDEST_SEARCH * map.size);
     float tolerance = receiver_tolerance(map, receiver, place.z, n_dot_l);
     float blockers = 0.0, nearness = 0.0;
@@ -189,7 +192,7 @@ float soft_visibility(LightPoint point, vec3 origin, float radius, Receiver rece
         vec2 offset = search * disk_tap(tap, BLOCKER_TAPS, turn);
         ivec2 texel = texel_of(map, place.xy + offset);
         vec3 there = vec3(place.xy + offset, place.z + dot(gradient, offset));
-        if (hides(map, texel, there, tolerance + SUBPIXEL * (abs(gradient.x) + abs(gradient.y)))) {
+        if (hides(map, texel, there, gradient, tolerance)) {
             blockers += 1.0;
             nearness += fetch_caster(map, texel).x;
         }
@@ -201,9 +204,7 @@ float soft_visibility(LightPoint point, vec3 origin, float radius, Receiver rece
     for (int tap = 0; tap < FILTER_TAPS; ++tap) {
         vec2 offset = penumbra * disk_tap(tap, FILTER_TAPS, turn);
         vec3 there = vec3(place.xy + offset, place.z + dot(gradient, offset));
-        bool hidden = hides(map, texel_of(map, there.xy), there,
-                            tolerance + SUBPIXEL * (abs(gradient.x) + abs(gradient.y)));
-        lit += hidden ? 0.0 : 1.0;
+        lit += hides(map, texel_of(map, there.xy), there, gradient, tolerance) ? 0.0 : 1.0;
     }
     return lit / float(FILTER_TAPS);
 }

@@ -40,7 +40,7 @@ _CHANNEL_SAMPLERS = {
 }
 """Target -> the sampler that shaders read it through."""
 
-_GGX_ALBEDO = "ggx_albedo_table"
+_GGX_ALBEDO, _LTC = "ggx_albedo_table", "ltc_table"
 _CAMERA_BINDING, _PASS_BINDING = 0, 1
 
 
@@ -58,7 +58,7 @@ def fullscreen_program(
         fragment=fragment,
         defines=defines,
         blocks=(CAMERA_UNIFORMS, block),
-        samplers=(*_CHANNEL_SAMPLERS.values(), _GGX_ALBEDO, *samplers),
+        samplers=(*_CHANNEL_SAMPLERS.values(), _GGX_ALBEDO, _LTC, *samplers),
         generated=generated,
     )
 
@@ -76,10 +76,11 @@ class FullscreenDraw:
         self._vertex_arrays: dict[ProgramSpec, moderngl.VertexArray] = {}
 
     def bind(self, frame: Frame, spec: ProgramSpec, planned: PlannedPass) -> None:
-        """Bind the camera, the targets that the pass reads and the GGX table."""
+        """Bind the camera, the targets that the pass reads and the tables of the GGX BRDF."""
         for name in planned.reads:
             frame.pool.texture(name).use(spec.samplers.index(_CHANNEL_SAMPLERS[name]))
         self._device.ggx_albedo.use(spec.samplers.index(_GGX_ALBEDO))
+        self._device.ltc.use(spec.samplers.index(_LTC))
         rotation = np.eye(4)
         rotation[:3, :3] = frame.camera.rotation
         self._camera.bind(

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Real scenes with direct light only, ours beside Cycles' without bounces: a sheet for the README, and FLIP."""
+
+import sys
+import tempfile
+from pathlib import Path
+
+from blender_tests.bench._flip import flip, read, write_sheet
+from blender_tests.bench._runs import REPOSITORY, SHARED, machine, picture, report, table
+
+SCENES = {
+    "Sponza, sun and sky": SHARED / "sponza" / "sponza.blend",
+    "Living room": SHARED / "living_room" / "living_room.blend",
+}
+RESOLUTION = (480, 270)
+OUR_SAMPLES, CYCLES_SAMPLES = 256, 256
+LIMIT = 0.05
+NAME = "direct_sheet"
+SHEET = REPOSITORY / "scenes" / "pictures" / "direct_light.jpg"
+CYCLES = {
+    "max_bounces": 0,
+    "use_adaptive_sampling": False,
+    "use_denoising": False,
+    "sample_clamp_direct": 0.0,
+    "light_sampling_threshold": 0.0,
+}
+
+
+def main(arguments: list[str]) -> int:
+    """Run the bench; exit code 1 where FLIP is above the limit in any scene."""
+    if arguments:
+        print(f"{NAME} takes no arguments")
+        return 2
+    rows, sheet, worst = [], [], 0.0
+    with tempfile.TemporaryDirectory(prefix="deep_gbuffer_bench_") as folder:
+        for name, blend in SCENES.items():
+            if not blend.is_file():
+                print(f"left out, as it is not there: {blend.name}")
+                continue
+            theirs, again, ours = (
+                read(picture(blend, engine, Path(folder) / f"{label}.png", RESOLUTION, samples, settings))
+                for label, engine, samples, settings in (
+                    ("cycles", "CYCLES", CYCLES_SAMPLES, CYCLES),
+                    ("again", "CYCLES", CYCLES_SAMPLES, {**CYCLES, "seed": 1}),
+                    ("ours", "DEEP_GBUFFER", OUR_SAMPLES, {}),
+                )
+            )
+            shown, mean = flip(theirs, ours)
+            noise = flip(theirs, again)[1]
+            worst = max(worst, mean)
+            rows.append([name, f"{mean:.4f}", f"{noise:.4f}"])
+            sheet.append(
+                [(f"{name}: Deep G-Buffer", ours), ("Cycles, no bounces", theirs), (f"FLIP {mean:.3f}", shown)]
+            )
+    if not rows:
+        return 0
+    write_sheet(SHEET, sheet)
+    text = table(["scene", "FLIP", "Cycles' own noise"], rows)
+    text += (
+        f"\n`python3 build.py bench {NAME}`: {RESOLUTION[0]}×{RESOLUTION[1]}, {OUR_SAMPLES} samples of ours against "
+        f"{CYCLES_SAMPLES} of Cycles without bounces, through the file's view transform; noise: Cycles against itself "
+        f"with another seed. Limit: {LIMIT}. Machine: {machine()}.\n"
+    )
+    report(NAME, "Direct light in real scenes", text)
+    return 0 if worst <= LIMIT else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
