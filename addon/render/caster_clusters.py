@@ -19,7 +19,7 @@ SMALLEST = 4 * CLUSTER_TRIANGLES
 """Triangles below which a mesh is drawn whole."""
 
 WHOLE_VIEWS = 16
-"""Views that draw a mesh whole before it is cut into clusters, which takes about as long as they do: a mesh that changes
+"""Views that draw a mesh whole before it is cut into clusters, which takes about as long as they do: one that changes
 from picture to picture and is in few shadow maps never is."""
 
 
@@ -46,7 +46,7 @@ class _Placed:
 
     def runs(self, visible: BoolArray) -> list[tuple[int, int]]:
         """Stretches of indices of the clusters that are visible as any instance, by all boxes."""
-        chosen = visible[self.boxes].reshape(-1, len(self.first)).any(axis=0)
+        chosen = np.logical_or.reduce(visible[self.boxes].reshape(-1, len(self.first)))
         return runs(chosen, 3 * self.first, 3 * self.count)
 
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from ..scene import Mesh
 from ..scene.arrays import BoolArray, Float32Array, Float64Array, Int64Array, UInt32Array
-from .frustum import boxes_inside
 
 CLUSTER_TRIANGLES = 64
 """The most that a cluster has."""
@@ -64,14 +63,8 @@ def placed_boxes(boxes: Float32Array, world_from_object: Float64Array) -> Float6
     return np.stack([middles - extents, middles + extents], axis=1)
 
 
-def visible_runs(clusters: Clusters, planes: Float64Array) -> list[tuple[int, int]]:
-    """(first triangle, count) of the stretches of clusters that reach into half spaces (P, 4), object space."""
-    visible = boxes_inside(clusters.boxes.astype(np.float64), planes)
-    return runs(visible, clusters.first, clusters.count)
-
-
 def runs(chosen: BoolArray, first: Int64Array, count: Int64Array) -> list[tuple[int, int]]:
-    """(first, count) of the stretches of what is chosen (C,), where each follows the one before unless there is a gap."""
+    """(first, count) of the stretches of what is chosen (C,): what begins where the one before ends goes with it."""
     at = np.flatnonzero(chosen)
     if len(at) == 0:
         return []
@@ -105,7 +98,7 @@ def _spread(values: Int64Array) -> Int64Array:
 
 
 def _cuts(codes: Int64Array) -> Int64Array:
-    """(C,) where clusters begin among ascending Morton codes (N,): at cells' borders, and inside cells that are full."""
+    """(C,) where clusters begin among ascending Morton codes (N,): where cells do, and inside of the smallest cells."""
     differing = np.frexp((codes[1:] ^ codes[:-1]).astype(np.float64))[1].astype(np.int8)  # bits up to the highest
     starts = np.zeros(min(len(codes), 1), np.int64)
     for level in range(3 * _AXIS_BITS, 0, -1):

@@ -9,7 +9,7 @@ import moderngl
 import numpy as np
 
 from ..scene import InstanceBatch, Mesh, Scene
-from ..scene.arrays import Float32Array, Float64Array, Int64Array
+from ..scene.arrays import Float32Array, Float64Array, Int64Array, UInt32Array
 from ..scene.correspondence import Correspondence
 from .device import Device, RenderError
 
@@ -60,6 +60,19 @@ class PositionBuffer:
     def __init__(self, context: moderngl.Context, positions: Float32Array) -> None:
         self.positions = positions  # kept alive: it is known by identity
         self.buffer = context.buffer(np.ascontiguousarray(positions, np.float32))
+        self.bytes = self.buffer.size
+
+    def release(self) -> None:
+        """Free the buffer."""
+        self.buffer.release()
+
+
+class IndexBuffer:
+    """The triangles of a mesh in another order."""
+
+    def __init__(self, context: moderngl.Context, triangles: UInt32Array) -> None:
+        self.triangles = triangles  # kept alive: it is known by identity
+        self.buffer = context.buffer(np.ascontiguousarray(triangles, np.uint32))
         self.bytes = self.buffer.size
 
     def release(self) -> None:
@@ -185,6 +198,7 @@ class GeometryStore:
         self._meshes = _Uploads[MeshBuffers](device)
         self._batches = _Uploads[InstanceBuffer](device)
         self._positions = _Uploads[PositionBuffer](device)
+        self._indices = _Uploads[IndexBuffer](device)
         self._poses = _Uploads[PoseTexture](device)
         self._vertex_arrays: dict[tuple[Hashable, ...], moderngl.VertexArray] = {}
 
@@ -197,6 +211,7 @@ class GeometryStore:
         batches = {_batch_key(batch) for scene in scenes for batch in scene.batches}
         self._poses.keep(self._poses.used)
         freed = self._meshes.keep(meshes) | self._batches.keep(batches) | self._positions.keep(self._positions.used)
+        freed |= self._indices.keep(self._indices.used)
         self._release_vertex_arrays(freed)
         for scene in scenes:
             for mesh in _drawn_meshes(scene):
@@ -205,9 +220,18 @@ class GeometryStore:
                 self._batch(batch)
 
     def vertex_array(
-        self, scene: Scene, batch: InstanceBatch, program: moderngl.Program, times: OtherTimes, copies: int
+        self,
+        scene: Scene,
+        batch: InstanceBatch,
+        program: moderngl.Program,
+        times: OtherTimes,
+        copies: int,
+        triangles: UInt32Array | None = None,
     ) -> moderngl.VertexArray:
-        """The vertex array that draws a batch of a scene with a program, each instance `copies` times in a row."""
+        """The vertex array that draws a batch of a scene with a program, each instance `copies` times in a row.
+
+        `triangles` (T, 3): those of the batch's mesh, in another order than its own.
+        """
         mesh = scene.meshes[batch.mesh]
         moved = [
             (other.positions(mesh), name)
@@ -216,15 +240,19 @@ class GeometryStore:
         ]
         other_places = [_positions_key(mesh, places) for places, _ in moved]
         self._positions.used.update(other_places)
-        key = (_batch_key(batch), _mesh_key(mesh), *other_places, program, copies)
+        triangles = mesh.triangles if triangles is None else triangles
+        order = _indices_key(mesh, triangles)
+        self._indices.used.add(order)
+        key = (_batch_key(batch), _mesh_key(mesh), *other_places, order, program, copies)
         if key not in self._vertex_arrays:
             buffers = self._mesh(mesh)
+            indices = self._indices_of(mesh, triangles)
             content: list[tuple[Any, ...]] = [attribute for attribute in buffers.attributes if attribute[2] in program]
             content += [(self._positions_at(mesh, places), "3f", name) for places, name in moved]
             used = [name for name in INSTANCE_ATTRIBUTES if name in program]
             instance_layout = INSTANCE_FORMAT if "in_indices" in program else "4f 4f 4f 3f 4x/i"
             content.append((self._batch(batch).buffer, instance_layout, *used))
-            vertex_array = self._context.vertex_array(program, content, buffers.indices, index_element_size=4)
+            vertex_array = self._context.vertex_array(program, content, indices, index_element_size=4)
             if copies > 1:
                 for name in used:
                     location = program[name].location  # pyright: ignore[reportAttributeAccessIssue]
@@ -241,15 +269,18 @@ class GeometryStore:
 
     def bytes(self) -> int:
         """Bytes of all buffers and textures of poses."""
-        return sum(uploads.bytes() for uploads in (self._meshes, self._batches, self._positions, self._poses))
+        return sum(uploads.bytes() for uploads in self._uploads())
 
     def release(self) -> None:
         """Free everything."""
         for vertex_array in self._vertex_arrays.values():
             vertex_array.release()
         self._vertex_arrays.clear()
-        for uploads in (self._meshes, self._batches, self._positions, self._poses):
+        for uploads in self._uploads():
             uploads.keep(set())
+
+    def _uploads(self) -> tuple[_Uploads[Any], ...]:
+        return self._meshes, self._batches, self._positions, self._indices, self._poses
 
     def _mesh(self, mesh: Mesh) -> MeshBuffers:
         return self._meshes.get(_mesh_key(mesh), lambda: MeshBuffers(self._context, mesh), f'mesh "{mesh.name}"')
@@ -264,6 +295,13 @@ class GeometryStore:
         label = f'earlier or later vertices of mesh "{mesh.name}"'
         key = _positions_key(mesh, positions)
         return self._positions.get(key, lambda: PositionBuffer(self._context, positions), label).buffer
+
+    def _indices_of(self, mesh: Mesh, triangles: UInt32Array) -> moderngl.Buffer:
+        if triangles is mesh.triangles:
+            return self._mesh(mesh).indices
+        label = f'sorted triangles of mesh "{mesh.name}"'
+        key = _indices_key(mesh, triangles)
+        return self._indices.get(key, lambda: IndexBuffer(self._context, triangles), label).buffer
 
     def _release_vertex_arrays(self, of: set[Hashable]) -> None:
         """Free those that read anything whose key is among `of`."""
@@ -281,6 +319,10 @@ def _mesh_key(mesh: Mesh) -> Hashable:
 
 def _batch_key(batch: InstanceBatch) -> Hashable:
     return "batch", batch.key, batch.version
+
+
+def _indices_key(mesh: Mesh, triangles: UInt32Array) -> Hashable:
+    return _mesh_key(mesh) if triangles is mesh.triangles else ("indices", id(triangles))
 
 
 def _positions_key(mesh: Mesh, positions: Float32Array) -> Hashable:

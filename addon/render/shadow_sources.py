@@ -18,7 +18,7 @@ _CUBE_SHARE = 2
 """A cube's face has at most half as many texels a side as the largest map: there are six."""
 
 _WORLD_SHARE = 2
-_WORLD_CASCADES = 2
+_WORLD_CASCADES = 1
 """Maps of the world's directions are coarser than a sun's: very many of them are averaged."""
 
 

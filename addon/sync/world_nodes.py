@@ -125,7 +125,10 @@ def _sky_texture(source: Source, evaluator: WorldEvaluator) -> Field:
     rgb_from_xyz = _rgb_from_xyz()
     if node.sky_type in {"PREETHAM", "HOSEK_WILKIE"}:
         if node.sky_type == "HOSEK_WILKIE":
-            evaluator.warn(node, "the Hosek / Wilkie model is not rendered yet; the Preetham model is used instead")
+            evaluator.warn(
+                node,
+                "the Hosek / Wilkie model is not rendered yet; the Preetham model, which is brighter, is used instead",
+            )
         x, y, z = node.sun_direction
         return SkyTexture(inputs, PreethamSky((x, y, z), node.turbidity, rgb_from_xyz))
     if node.sky_type not in {"NISHITA", "SINGLE_SCATTERING", "MULTIPLE_SCATTERING"}:
@@ -146,7 +149,7 @@ def _sky_texture(source: Source, evaluator: WorldEvaluator) -> Field:
 
 def _rgb_from_xyz() -> tuple[float, ...]:
     """(3, 3), row by row: scene-linear colours of CIE XYZ, in whatever colour space Blender works."""
-    columns = [mathutils.Color(axis).from_xyz_d65_to_scene_linear() for axis in np.eye(3)]
+    columns = [mathutils.Color(axis.tolist()).from_xyz_d65_to_scene_linear() for axis in np.eye(3)]
     return tuple(float(column[row]) for row in range(3) for column in columns)
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 import pytest
 
 from addon.render import frames_before, plan
-from addon.scene import Channel, DebugView, LightKind, RenderSettings, Variant
+from addon.scene import Channel, DebugView, EmissionSampling, LightKind, RenderSettings, Variant
 from blender_tests import builders
 
 SETTINGS = RenderSettings(64, 64, layers=4)
@@ -24,7 +24,7 @@ def layers_written(planned):
 
 
 def test_a_lit_scene_needs_every_pass():
-    assert names(plan(LIT, SETTINGS)) == ["gbuffer", "depth_tiles", "direct", "composite"]
+    assert names(plan(LIT, SETTINGS)) == ["gbuffer", "depth_tiles", "shadow_maps", "direct", "composite"]
 
 
 def test_layers_nobody_reads_are_left_out_with_the_reason():
@@ -62,12 +62,16 @@ def test_nothing_to_light_with_means_no_direct_pass():
 
 
 def test_emission_and_world_are_compiled_only_where_there_are_any():
-    assert plan(LIT, SETTINGS).find("direct").defines == {"SPHERE_LIGHTS"}
+    assert plan(LIT, SETTINGS).find("direct").defines == {"SPHERE_LIGHTS", "SHADOWS"}
     world = builders.scene(builders.quad("q"), world=(0.1, 0.0, 0.0))
-    assert plan(world, SETTINGS).find("direct").defines == {"WORLD"}
+    assert plan(world, SETTINGS).find("direct").defines == {"WORLD", "WORLD_LIGHTS", "SHADOWS"}
     lamp = builders.scene(builders.quad("q"), materials=(builders.material(emission=(1.0, 0, 0)),))
     planned = plan(lamp, SETTINGS)
+    assert planned.find("direct").defines == {"EMISSION", "MESH_LIGHTS", "SHADOWS"}
+    glow = builders.material(emission=(1.0, 0, 0), emission_sampling=EmissionSampling.NONE)
+    planned = plan(builders.scene(builders.quad("q"), materials=(glow,)), SETTINGS)
     assert planned.find("direct").defines == {"EMISSION"}
+    assert "Emission Sampling" in reasons(planned)["light of emissive materials"]
     assert "gbuffer normal" in reasons(planned)
 
 
@@ -84,7 +88,7 @@ def test_emission_and_world_are_compiled_only_where_there_are_any():
 def test_tiles_have_depth_ranges_for_shadow_maps_and_for_many_lights(lights, world, wanted):
     planned = plan(builders.scene(builders.quad("q"), lights=lights, world=world), SETTINGS)
     assert ("depth_tiles" in names(planned)) == wanted
-    assert wanted or "no light casts a shadow" in reasons(planned)["depth_tiles"]
+    assert wanted or "no shadows" in reasons(planned)["depth_tiles"]
 
 
 @pytest.mark.parametrize(
@@ -98,9 +102,9 @@ def test_tiles_have_depth_ranges_for_shadow_maps_and_for_many_lights(lights, wor
 )
 def test_only_the_kinds_of_light_there_are_get_compiled(light, defines):
     scene = builders.scene(builders.quad("q"), lights=(light,))
-    assert plan(scene, SETTINGS).find("direct").defines == defines
+    assert plan(scene, SETTINGS).find("direct").defines == defines | {"SHADOWS"}
     glossy = builders.scene(builders.quad("q"), lights=(light,), materials=(builders.material(specular=0.04),))
-    assert plan(glossy, SETTINGS).find("direct").defines == defines | {"SPECULAR"}
+    assert plan(glossy, SETTINGS).find("direct").defines == defines | {"SPECULAR", "SHADOWS"}
     assert "direct sun_lights" in reasons(plan(scene, SETTINGS)) or light.kind is LightKind.SUN
 
 
@@ -136,7 +140,7 @@ def test_motion_and_exit_surfaces_are_built_for_whoever_reads_them():
     assert reasons(planned)["exit"].startswith("no effect, output or debug view")
     assert layers_written(plan(LIT, replace(everything, motion_vectors=True)))["gbuffer.motion"] == 4
     planned = plan(LIT, replace(everything, exit_surfaces=True))
-    assert names(planned) == ["gbuffer", "exit", "depth_tiles", "direct", "composite"]
+    assert names(planned) == ["gbuffer", "exit", "depth_tiles", "shadow_maps", "direct", "composite"]
     assert layers_written(planned)["exit.view_depth"] == 4
     shown = plan(LIT, replace(SETTINGS, debug_view=DebugView.EXIT_ALBEDO, debug_layer=1))
     assert names(shown) == ["gbuffer", "exit", "composite"]
@@ -171,7 +175,7 @@ def test_nothing_looks_ahead_of_the_last_picture():
 @pytest.mark.parametrize("variant", ONE_PASS)
 def test_a_single_layer_has_no_variant(variant):
     planned = plan(LIT, replace(SETTINGS, variant=variant))
-    assert names(planned) == ["gbuffer", "depth_tiles", "direct", "composite"]
+    assert names(planned) == ["gbuffer", "depth_tiles", "shadow_maps", "direct", "composite"]
     assert reasons(planned)["oracle"] == "only one layer is built"
     assert not planned.one_pass
 

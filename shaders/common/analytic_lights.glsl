@@ -113,29 +113,49 @@ Polygon light_polygon(Light light, vec3 center)
                          : rectangle_polygon(center, light.half_x, light.half_y);
 }
 
+/** Share of a cosine lobe about the normal that a polygon covers. */
+float covered_cosine(Polygon polygon, vec3 normal)
+{
+    vec3 tangent, bitangent;
+    orthonormal_basis(normal, tangent, bitangent);
+    mat3 local = transpose(mat3(tangent, bitangent, normal));
+    return cosine_lobe_over(transformed(local, polygon), vec3(0.0, 0.0, 1.0)).z;
+}
+
 /**
- * Mean of the spread factor over the light as the surface receives it, by quadrature at 8x8 points.
+ * Irradiance over π by the part of a light of emission 1 that its spread lets shine here.
  *
- * Only this mean is approximated: what it multiplies, the irradiance by the light without spread, is exact.
+ * Approximate: the rectangle around the part within the spread, exactly, times the mean of the spread factor over it by
+ * 8x8 points; an ellipse's rim is blurred over the distance between two of them.
  */
-float mean_spread(Light light, vec3 center, vec3 normal)
+float covered_by_spread(Light light, vec3 center, vec3 normal)
 {
     const int POINTS = 8;
+    vec2 half_size = vec2(length(light.half_x), length(light.half_y));
+    vec2 foot = -vec2(dot(center, light.half_x), dot(center, light.half_y)) / (half_size * half_size);
+    vec2 reach = -dot(center, light.axis) * light.spread_slope / half_size;
+    vec2 low = max(foot - reach, -1.0), high = min(foot + reach, 1.0);
+    if (any(greaterThanEqual(low, high)))
+        return 0.0;
+    vec2 step_size = (high - low) / float(POINTS);
     float received = 0.0;
     float spread = 0.0;
     for (int index = 0; index < POINTS * POINTS; ++index) {
-        vec2 u = (vec2(index % POINTS, index / POINTS) + 0.5) / float(POINTS);
-        // Of an ellipse, rings of equal area.
-        float angle = 2.0 * PI * u.x;
-        vec2 place = light.ellipse ? sqrt(u.y) * vec2(cos(angle), sin(angle)) : 2.0 * u - 1.0;
+        vec2 place = low + (vec2(index % POINTS, index / POINTS) + 0.5) * step_size;
         vec3 to_light = center + place.x * light.half_x + place.y * light.half_y;
         float distance_squared = dot(to_light, to_light);
         float cosine = -dot(to_light, light.axis) * inversesqrt(distance_squared);
         float weight = max(dot(normal, to_light), 0.0) * cosine / (distance_squared * sqrt(distance_squared));
+        float inside = (1.0 - length(place)) / (0.5 * (step_size.x + step_size.y)) + 0.5;
         received += weight;
-        spread += weight * spread_factor(light, cosine);
+        spread += weight * spread_factor(light, cosine) * (light.ellipse ? clamp(inside, 0.0, 1.0) : 1.0);
     }
-    return received > 0.0 ? spread / received : 0.0;
+    if (received == 0.0)
+        return 0.0;
+    vec2 middle = 0.5 * (low + high);
+    Polygon part = rectangle_polygon(center + middle.x * light.half_x + middle.y * light.half_y,
+                                     0.5 * (high.x - low.x) * light.half_x, 0.5 * (high.y - low.y) * light.half_y);
+    return covered_cosine(part, normal) * spread / received;
 }
 
 vec3 area_irradiance(Light light, vec3 center, vec3 normal)
@@ -144,12 +164,9 @@ vec3 area_irradiance(Light light, vec3 center, vec3 normal)
         return vec3(0.0);
     if (angular_size(light, center) < SMALLEST_ANGLE)
         return small_area_irradiance(light, center) * max(dot(normal, normalize(center)), 0.0);
-    vec3 tangent, bitangent;
-    orthonormal_basis(normal, tangent, bitangent);
-    mat3 local = transpose(mat3(tangent, bitangent, normal));
-    float covered = cosine_lobe_over(transformed(local, light_polygon(light, center)), vec3(0.0, 0.0, 1.0)).z;
-    float spread = light.spread_norm > 0.0 ? mean_spread(light, center, normal) : 1.0;
-    return light.emission * (PI * covered * spread);
+    float covered = light.spread_norm > 0.0 ? covered_by_spread(light, center, normal)
+                                            : covered_cosine(light_polygon(light, center), normal);
+    return light.emission * (PI * covered);
 }
 #endif
 
