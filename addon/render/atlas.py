@@ -50,7 +50,7 @@ class AtlasLayout:
         if larger is None:
             return None
         first, *others = larger.quarters
-        self._parents |= {quarter: larger for quarter in larger.quarters}
+        self._parents |= dict.fromkeys(larger.quarters, larger)
         free.update(others)
         return first
 

@@ -71,4 +71,3 @@ def direct_program_defines(defines: frozenset[str], *, preview: bool) -> frozens
     else:
         chosen -= {"SHADOWS", "LINKING", "MANY_LIGHTS"}
     return frozenset(chosen)
-

@@ -17,7 +17,7 @@ _BALL_TABLE_SIZE = 4097
 
 
 def points_used(light_count: int, samples: int, updates: int) -> int:
-    """How many points of each of `light_count` lights `samples` samples use, where `updates` of them change a sample."""
+    """How many points of each of `light_count` lights `samples` samples use, `updates` of them a new one per sample."""
     return max(-(-(samples - 1) * min(updates, light_count) // max(light_count, 1)), 0) + 1
 
 
@@ -56,9 +56,9 @@ def _coprime(count: int, ratio: float) -> int:
 
 def light_shifts(keys: Sequence[str], seed: int) -> Float64Array:
     """(L, 3) in [0, 1): where each light's lattice starts, by its key, so that other lights change nothing."""
-    return np.array(
-        [np.random.default_rng((crc32(key.encode()), seed)).random(3) for key in keys], np.float64
-    ).reshape(-1, 3)
+    return np.array([np.random.default_rng((crc32(key.encode()), seed)).random(3) for key in keys], np.float64).reshape(
+        -1, 3
+    )
 
 
 def folded(points: Float64Array) -> Float64Array:

@@ -10,7 +10,15 @@ from ..scene import AreaShape, Light, LightKind, RenderSettings, Scene, World
 from ..scene.arrays import Float32Array, Float64Array, Int64Array
 from .device import Device
 from .light_reach import roulette, sampled_reach
-from .light_samples import ball_points, disk_points, held_points, lattice_points, light_shifts, points_used, square_points
+from .light_samples import (
+    ball_points,
+    disk_points,
+    held_points,
+    lattice_points,
+    light_shifts,
+    points_used,
+    square_points,
+)
 from .light_table import TEXELS_PER_SAMPLE, as_texels, light_rows, mesh_light_rows, world_rows
 from .lighting_plan import LightPlan
 from .world_sampling import WorldSampler
@@ -20,8 +28,8 @@ class Lighting:
     """Lights in the order: lamps, emissive surfaces, directions of the world.
 
     After `begin_sample`: `points` (L, 3) float64, where in world space each lamp and surface is sampled, for a sun and
-    the world the direction towards it; `numbers` (L,): equal ones are equal points. `preview`: whether this sample shows
-    lamps whole. Texels 0.w and 1.w of `samples` (L, 3, 4) are for the shadow maps' pass to fill.
+    the world the direction towards it; `numbers` (L,): equal ones are equal points. `preview`: whether this sample
+    shows lamps whole. Texels 0.w and 1.w of `samples` (L, 3, 4) are for the shadow maps' pass to fill.
     """
 
     def __init__(self, device: Device) -> None:
@@ -144,7 +152,7 @@ class Lighting:
 
 
 def lamp_point(light: Light, offset: Float64Array) -> Float64Array:
-    """World-space point (3,) of a lamp at an offset (3,) as `Lighting.samples` holds it; of a sun, a direction to it."""
+    """World-space point (3,) of a lamp at an offset (3,) as `Lighting.samples` holds it; of a sun the direction to it."""
     rotation, center = light.world_from_light[:3, :3], light.world_from_light[:3, 3]
     if light.kind is LightKind.SUN:
         return sun_direction(rotation[:, 2], 0.5 * light.angle, offset)

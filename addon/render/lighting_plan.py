@@ -14,8 +14,8 @@ from .mesh_lights import MeshLight, mesh_lights
 class LightPlan:
     """The lights of a picture.
 
-    `lights`, `mesh_lights`: sampled every sample. `reach` (m) of each of `lights`: beyond it one is only sampled now and
-    then. `world_directions`: from how many directions the world lights each sample. `preview`: whether the first sample
+    `lights`, `mesh_lights`: sampled every sample. `reach` (m) of each of `lights`: beyond it one is only sampled now
+    and then. `world_directions`: from how many directions the world lights each sample. `preview`: whether the first sample
     shows lights by closed forms and their shadows from their centres. `casts_shadows`: whether anything does.
     """
 

@@ -93,9 +93,7 @@ _FILM_CHANNELS = {
 }
 
 
-def plan(
-    scene: Scene, settings: RenderSettings, camera: Camera | None = None, *, continuous: bool = False
-) -> Plan:
+def plan(scene: Scene, settings: RenderSettings, camera: Camera | None = None, *, continuous: bool = False) -> Plan:
     """Decide the passes for one scene, seen by a camera (None: it may be anywhere), and one set of settings.
 
     `continuous` as in `Sequence`.

@@ -13,8 +13,8 @@ from .draws import DrawLists
 from .film import Film
 from .geometry import GeometryStore
 from .images import ImageStore
-from .lighting import Lighting
 from .layering import Trial, calibration_view, resolved
+from .lighting import Lighting
 from .oracle_state import OracleState
 from .passes import PASSES, Frame, Pass
 from .plan import FIRST_SAMPLE_CHANNELS, Plan, plan

@@ -26,8 +26,8 @@ _WORLD_CASCADES = 1
 class ShadowSource:
     """A light that casts shadows: its `index` among the lights, and which groups of instances block it.
 
-    `local`: the receivers as it sees them; None where it is infinitely far. `texel`: its own limit, `Light.shadow_texel`.
-    `share`: what the largest map's size is divided by; `cascades`: how many maps a distant light may have.
+    `local`: the receivers as it sees them; None where it is infinitely far. `texel`: `Light.shadow_texel`. `share`:
+    what the largest map's size is divided by; `cascades`: how many maps a distant light may have.
     """
 
     index: int

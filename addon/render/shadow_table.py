@@ -16,9 +16,9 @@ SHADOW_CUBE = -1.0
 def shadow_row(camera: Camera, slot: Slot, origin: Float64Array) -> Float32Array:
     """(6, 4) float32 of one map: four matrix rows from camera-relative (`origin` (3,)) to map space, its place, optics.
 
-    Map space (x, y, n, w): texel of the map's page x/w, y/w, nearness n/w as `shadow_maps.frag` has it. The place: lower
-    left texel x, y, texels a side (0: there is no map), page. The optics: width of a texel at distance 1 (orthographic:
-    m), whether it is orthographic.
+    Map space (x, y, n, w): texel of the map's page x/w, y/w, nearness n/w as `shadow_maps.frag` has it. The place:
+    lower left texel x, y, texels a side (0: there is no map), page. The optics: width of a texel at distance 1
+    (orthographic: m), whether it is orthographic.
     """
     left, right, bottom, top = camera.window
     to_texel = np.array([slot.size / (right - left), slot.size / (top - bottom)])

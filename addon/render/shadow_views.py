@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What shadow maps a light needs for what the camera sees: which way they look, how far and how finely."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from math import ceil, floor, log, log2, pi, tan
 
@@ -139,9 +138,7 @@ def sun_maps(
         count = min(ceil(log(coarseness / 2.0) / log(_CASCADE_RATIO)) + 1, cascades)
     start = max(nearest, farthest * 1e-4)
     ends = [start * (farthest / start) ** ((i + 1) / count) for i in range(count - 1)]
-    parts = [
-        receivers.between(low, high) for low, high in zip([0.0, *ends], [*ends, farthest], strict=True)
-    ]
+    parts = [receivers.between(low, high) for low, high in zip([0.0, *ends], [*ends, farthest], strict=True)]
     return tuple(_orthographic(part, frame, casters, size, texel) for part in parts if part.count)
 
 
@@ -181,8 +178,7 @@ def _orthographic(
     x, y = (step * floor(value / step + 0.5) for value in 0.5 * (low + high)[:2])
     towards = [float(high[2])]  # light space: the light is at +Z
     if len(casters):
-        corners_z = np.stack(_corner_heights(casters, frame[:, 2]))
-        towards.append(float(corners_z.max()))
+        towards.append(float(_greatest(casters, frame[:, 2]).max()))
     depth = _rounded_up(max(towards) - float(low[2]) + 0.05 * side)
     end = step * floor(float(low[2]) / step) - 0.01 * side
     pose = np.eye(4)
@@ -193,10 +189,9 @@ def _orthographic(
     return ShadowMap(Camera(pose, (-half, half, -half, half), 0.0, depth + step, orthographic=True), wanted)
 
 
-def _corner_heights(bounds: Float64Array, axis: Float64Array) -> Iterable[Float64Array]:
-    """Greatest and smallest coordinate (K,) of each box along an axis."""
-    low, high = bounds[:, 0] * axis, bounds[:, 1] * axis
-    return np.maximum(low, high).sum(axis=1), np.minimum(low, high).sum(axis=1)
+def _greatest(bounds: Float64Array, axis: Float64Array) -> Float64Array:
+    """Greatest coordinate (K,) of each box along an axis."""
+    return np.maximum(bounds[:, 0] * axis, bounds[:, 1] * axis).sum(axis=1)
 
 
 def _rounded_up(value: float) -> float:

@@ -52,3 +52,15 @@ def interpolated(values: Float32Array | Float64Array, column: Float64Array, row:
     rows = below.astype(np.int64) % height, (below.astype(np.int64) + 1) % height
     lower, upper = (values[at, columns[0]] * (1.0 - right_share) + values[at, columns[1]] * right_share for at in rows)
     return lower * (1.0 - above_share) + upper * above_share
+
+
+def box_sums(values: Float32Array | Float64Array, edges: Float64Array) -> Float64Array:
+    """(..., n) float64: sums of `values` (..., m) over stretches between successive `edges` (n + 1,), in entries.
+
+    Entries are spread evenly over their place; parts of them count in part.
+    """
+    count = values.shape[-1]
+    whole = np.minimum(edges.astype(np.int64), count - 1)
+    before = np.zeros((*values.shape[:-1], count + 1))
+    np.cumsum(values, axis=-1, out=before[..., 1:])
+    return np.diff(before[..., whole] + values[..., whole] * (edges - whole), axis=-1)

@@ -45,6 +45,8 @@ def sun_irradiance(sky: Sky, size: float) -> Float64Array:
     sine = np.sin(sky.sun_elevation) * np.cos(angle) + np.cos(sky.sun_elevation) * np.sin(angle) * np.cos(around)
     elevation = np.arcsin(np.clip(sine, -1.0, 1.0))
     height = (elevation - sky.sun_elevation) / size + 0.5
+    if sky.before_5 and sky.sun_elevation <= half:
+        height = elevation / max(sky.sun_elevation + half, 1e-9)  # from the horizon, where the sun is setting
     lowest, highest = _edges(sky, half, solid_angle)
     radiance = lowest + (highest - lowest) * height[..., None]
     limb = 1.0 - _LIMB_DARKENING * (1.0 - np.sqrt(np.maximum(1.0 - (angle / half) ** 2, 0.0)))

@@ -66,7 +66,10 @@ def test_a_coloured_rough_diffuse_surface_reflects_its_directional_albedo(view_c
 
 def test_diffuse_reflection_without_roughness_is_lamberts():
     directions, _ = hemisphere(16, 8)
-    body = MAKE + "vec4 evaluate() { return vec4(diffuse_brdf_cosine(surface(), vec3(0, 0, 1), view.xyz, direction.xyz), 0); }"
+    body = (
+        MAKE
+        + "vec4 evaluate() { return vec4(diffuse_brdf_cosine(surface(), vec3(0, 0, 1), view.xyz, direction.xyz), 0); }"
+    )
     values = evaluate(INCLUDES, body, inputs(0.3, directions, color=(0.9, 0.5, 0.1)), defines=DEFINES)
     expected = np.float64([0.9, 0.5, 0.1]) / np.pi * directions[:, 2:]
     np.testing.assert_allclose(values[:, :3], expected, rtol=1e-5, atol=1e-7)
@@ -76,7 +79,13 @@ def test_diffuse_reflection_without_roughness_is_lamberts():
 @pytest.mark.parametrize("roughness", [0.45, 0.7, 1.0])
 @pytest.mark.parametrize(
     "surface",
-    [{"metallic": 1.0}, {"metallic": 1.0, "color": (0.9, 0.4, 0.05)}, {"f0": 0.04}, {"f0": 0.2}, {"f0": 0.04, "metallic": 0.5}],
+    [
+        {"metallic": 1.0},
+        {"metallic": 1.0, "color": (0.9, 0.4, 0.05)},
+        {"f0": 0.04},
+        {"f0": 0.2},
+        {"f0": 0.04, "metallic": 0.5},
+    ],
 )
 def test_highlights_sum_to_the_specular_albedo(view_cosine, roughness, surface):
     """The table is linear between 32 nodes of a function whose second derivative is below 10: 10/(8·31²) of error."""
@@ -129,7 +138,9 @@ def test_no_surface_or_direction_gives_nan():
         "material": generator.choice(edge, (count, 3)),
         "direction": directions,
     }
-    body = MAKE + """
+    body = (
+        MAKE
+        + """
     vec4 evaluate()
     {
         vec3 normal = vec3(0, 0, 1);
@@ -138,6 +149,7 @@ def test_no_surface_or_direction_gives_nan():
         vec3 albedo = surface().specular_albedo + diffuse_directional_albedo(surface(), view.z);
         return vec4(min(min(diffuse, specular), albedo), dot(diffuse + specular + albedo, vec3(1)));
     }"""
+    )
     result = evaluate(INCLUDES, body, values, defines=DEFINES)
     assert np.isfinite(result).all()
     assert (result >= 0.0).all()

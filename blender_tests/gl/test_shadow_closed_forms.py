@@ -51,7 +51,8 @@ def assert_shadow(found, expected, whole):
     shares = expected / whole
     assert (shares == 0.0).sum() >= 4, "the case must have an umbra"
     assert ((shares > 0.1) & (shares < 0.9)).sum() >= 3, "the case must have a penumbra"
-    assert (found[shares == 0.0] == 0.0).all(), "light leaks into the umbra"
+    leak = found[shares == 0.0] / whole[shares == 0.0]
+    assert not leak.any(), f"light leaks into the umbra: {leak}"
     np.testing.assert_allclose(found / whole, shares, atol=PENUMBRA)
     lit = shares > 1.0 - 1e-9
     np.testing.assert_allclose(found[lit], whole[lit], rtol=2e-3)
@@ -91,8 +92,8 @@ def test_sun_behind_an_edge(shared_session):
 
 @pytest.mark.parametrize("soft", [False, True])
 def test_small_sphere_behind_an_edge(shared_session, soft):
-    """A lamp far off for its size: the share of its disk, in which the cosine hardly varies (below 0.5 %)."""
-    radius = 0.15
+    """A lamp far off for its size: the share of its disk, over which cosine and distance vary evenly enough (second order, below 1 %)."""
+    radius = 0.3
     light = builders.light(position=(0.0, 0.0, LAMP_HEIGHT), emission=(8, 8, 8), radius=radius, soft_falloff=soft)
     x, found = row_of_light(shared_session, light)
     distance = np.sqrt(x**2 + LAMP_HEIGHT**2)
@@ -155,7 +156,10 @@ def test_linked_lights(shared_session):
     floor, screen = scene.batches
 
     def picture(light, floor_group=0, screen_group=0):
-        batches = (replace(floor, link_group=floor_group), replace(screen, link_group=screen_group))
+        batches = (
+            replace(floor, link_group=floor_group, version=1 + floor_group),
+            replace(screen, link_group=screen_group, version=1 + screen_group),
+        )
         changed = replace(scene, lights=(light,), batches=batches)
         return shared_session.show(changed, camera, samples=2).channels[Channel.COMBINED][..., :3]
 

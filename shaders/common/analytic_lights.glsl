@@ -82,15 +82,15 @@ float spread_factor(Light light, float cosine)
     return max(light.spread_slope - sqrt(max(1.0 - cosine * cosine, 0.0)) / cosine, 0.0) / light.spread_norm;
 }
 
-/** Whether the light's front faces a point, `center` being the light's as seen from there. */
-bool shines_on(Light light, vec3 center)
-{
-    return dot(center, light.axis) < 0.0;
-}
-
 float light_area(Light light)
 {
     return length(light.half_x) * length(light.half_y) * (light.ellipse ? PI : 4.0);
+}
+
+/** Whether the light has a front that faces a point, `center` being the light's as seen from there. */
+bool shines_on(Light light, vec3 center)
+{
+    return dot(center, light.axis) < 0.0 && light_area(light) > 0.0;
 }
 
 /** Irradiance of a facing surface by a small light of which every part is seen as its centre. */

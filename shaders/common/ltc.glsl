@@ -9,6 +9,9 @@ const int RECTANGLE_SIDES = 4;
 // Of the polygon that stands for an ellipse of the same area: irradiance is then right to 2e-4, see the tests.
 const int ELLIPSE_SIDES = 16;
 
+// Of a lobe, that a polygon must cover to have a mean direction in float32.
+const float SMALLEST_SHARE = 1e-15;
+
 /** centre + x cosφ + y sinφ for the polygon's corners, from the shaded point; φ in equal steps. Any unit of length. */
 struct Polygon
 {
@@ -141,7 +144,7 @@ CoveredLobe specular_lobe_over(Polygon polygon, float roughness, float n_dot_v)
     vec3 covered = cosine_lobe_over(transformed(inverse_matrix, polygon), vec3(-c, 0.0, a));
     float determinant = a * d - b * c;
     vec3 mean = vec3(d * covered.x - b * covered.z, determinant * covered.y, a * covered.z - c * covered.x);
-    if (!(covered.z > 0.0 && mean.z > 0.0))
+    if (!(covered.z > SMALLEST_SHARE && mean.z > 0.0))
         return CoveredLobe(0.0, vec3(0.0, 0.0, 1.0), 1.0);
     mean = normalize(mean);
     vec3 original = inverse_matrix * mean;

@@ -117,7 +117,9 @@ class ShadowMapsPass:
         while True:
             for source in self._sources:
                 self._update(frame, source, casters, receivers)
-            views = {source.index: self._views[source.index][1] for source in self._sources if self._is_lit(frame, source)}
+            views = {
+                source.index: self._views[source.index][1] for source in self._sources if self._is_lit(frame, source)
+            }
             texels = sum(view.shadow_map.size**2 for maps in views.values() for view in maps if view is not None)
             if texels <= self._store.capacity or self._largest <= SMALLEST_SIZE:
                 return views
