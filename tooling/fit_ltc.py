@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fit linearly transformed cosines to the GGX BRDF and write the table that the add-on loads.
 
-python tooling/fit_ltc.py      # about a minute; only needed again where the BRDF of shaders/common/bsdf.glsl changes
+python tooling/fit_ltc.py      # about a minute; only needed again where the BRDF of shaders/common/ggx.glsl changes
 
 Heitz, Dupuy, Hill and Neubelt 2016, "Real-Time Polygonal-Light Shading with Linearly Transformed Cosines". Per node of
 the table, a matrix M is sought such that directions distributed as a clamped cosine, transformed by M, are distributed
@@ -23,7 +23,7 @@ from addon.render.ltc import LTC_FILE, TABLE_SIZE, node_cosines, node_roughnesse
 Array = npt.NDArray[np.float64]
 
 STRATA = 32
-SMALLEST_ALPHA = 1e-3  # of shaders/common/bsdf.glsl
+SMALLEST_ALPHA = 1e-3  # of shaders/common/ggx.glsl
 NARROWEST = 1e-7  # of a lobe's scales
 
 
@@ -139,9 +139,9 @@ def main() -> None:
     upright = np.array([1.0, 1.0, 0.0])
     for column in reversed(range(TABLE_SIZE)):
         roughness = node_roughnesses()[column]
+        best = upright
         for row, cosine in enumerate(node_cosines()):
-            start = upright if row == 0 else best  # noqa: F821 - set in row 0
-            best, inverse = fit(roughness, cosine, start)
+            best, inverse = fit(roughness, cosine, best)
             upright = best if row == 0 else upright
             table[row, column] = inverse[0, 0], inverse[0, 2], inverse[2, 0], inverse[2, 2]
         print(f"roughness {roughness:.2f}")

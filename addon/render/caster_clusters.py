@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..scene import Mesh
-from ..scene.arrays import BoolArray, Float64Array, Int64Array, UInt32Array
+from ..scene.arrays import Float64Array, Int64Array, UInt32Array
 from .clusters import CLUSTER_TRIANGLES, Clusters, cluster, placed_boxes, runs
 from .draws import Draw
 from .frustum import boxes_inside
@@ -37,17 +37,14 @@ class CasterPart:
 
 @dataclass(frozen=True)
 class _Placed:
-    """The clusters that a caster consists of, and which of all boxes are theirs, instance after instance."""
+    """The clusters of all casters that have any, caster after caster: (M,) each one's caster, first index and index
+    count. `boxes` (K, 2, 3) float64, world space, of every instance of each cluster, which `owner` (K,) names."""
 
-    triangles: UInt32Array
+    caster: Int64Array
     first: Int64Array
     count: Int64Array
-    boxes: slice
-
-    def runs(self, visible: BoolArray) -> list[tuple[int, int]]:
-        """Stretches of indices of the clusters that are visible as any instance, by all boxes."""
-        chosen = np.logical_or.reduce(visible[self.boxes].reshape(-1, len(self.first)))
-        return runs(chosen, 3 * self.first, 3 * self.count)
+    boxes: Float64Array
+    owner: Int64Array
 
 
 class CasterClusters:
@@ -58,8 +55,7 @@ class CasterClusters:
         self._meshes: Mapping[str, Mesh] = {}
         self._whole_views: dict[tuple[str, int], int] = {}
         self._clusters: dict[tuple[str, int], Clusters] = {}
-        self._placed: dict[int, _Placed] = {}
-        self._boxes = np.zeros((0, 2, 3))
+        self._placed = _join([])
 
     def begin(self, draws: Sequence[Draw], meshes: Mapping[str, Mesh]) -> None:
         """These are the casters now, and the meshes by key."""
@@ -72,18 +68,33 @@ class CasterClusters:
         self._place()
 
     def seen(self, casters: Int64Array, planes: Float64Array) -> list[CasterPart]:
-        """What to draw of casters, given by index, in a view that sees what is inside of planes (P, 4), world space."""
+        """What to draw of casters, given by ascending index, in a view that sees what is inside of planes (P, 4), world
+        space."""
         self._cut({self._draws[index].batch.mesh for index in casters.tolist() if _is_worth(self._draws[index])})
-        visible = boxes_inside(self._boxes, planes)
-        parts = [self._part(index, visible) for index in casters.tolist()]
+        found = self._visible_runs(casters, planes)
+        parts = [self._part(index, found.get(index, [])) for index in casters.tolist()]
         return [part for part in parts if part.runs]
 
-    def _part(self, index: int, visible: BoolArray) -> CasterPart:
-        placed = self._placed.get(index)
-        if placed is not None:
-            return CasterPart(index, placed.triangles, placed.runs(visible))
+    def _visible_runs(self, casters: Int64Array, planes: Float64Array) -> dict[int, list[tuple[int, int]]]:
+        """Stretches of indices of the clusters that any instance of which is inside, by caster."""
+        placed = self._placed
+        chosen = np.zeros(len(placed.caster), np.bool_)
+        chosen[placed.owner[boxes_inside(placed.boxes, planes)]] = True
+        wanted = np.zeros(len(self._draws), np.bool_)
+        wanted[casters] = True
+        chosen &= wanted[placed.caster]
+        found: dict[int, list[tuple[int, int]]] = {}
+        for index, first, count in runs(chosen, placed.caster, placed.first, placed.count):
+            found.setdefault(index, []).append((first, count))
+        return found
+
+    def _part(self, index: int, found: list[tuple[int, int]]) -> CasterPart:
         draw = self._draws[index]
-        return CasterPart(index, self._meshes[draw.batch.mesh].triangles, [(draw.first_index, draw.index_count)])
+        mesh = self._meshes[draw.batch.mesh]
+        clusters = self._clusters.get(_identity(mesh))
+        if clusters is None or not _is_worth(draw):
+            return CasterPart(index, mesh.triangles, [(draw.first_index, draw.index_count)])
+        return CasterPart(index, clusters.triangles, found)
 
     def _cut(self, meshes: set[str]) -> None:
         """Make clusters of those of these meshes, in one more view, that have been in enough."""
@@ -100,22 +111,37 @@ class CasterClusters:
 
     def _place(self) -> None:
         """Find where the clusters of all casters are."""
-        boxes: list[Float64Array] = [np.zeros((0, 2, 3))]
-        self._placed = {}
-        total = 0
-        for index, draw in enumerate(self._draws):
-            clusters = self._clusters.get(_identity(self._meshes[draw.batch.mesh]))
-            if clusters is None or not _is_worth(draw):
-                continue
-            ends = np.searchsorted(3 * clusters.first, [draw.first_index, draw.first_index + draw.index_count])
-            own = slice(*ends.tolist())
-            placed = [placed_boxes(clusters.boxes[own], matrix) for matrix in draw.batch.matrices]
-            count = sum(map(len, placed))
-            where = slice(total, total + count)
-            self._placed[index] = _Placed(clusters.triangles, clusters.first[own], clusters.count[own], where)
-            boxes += placed
-            total += count
-        self._boxes = np.concatenate(boxes)
+        self._placed = _join(
+            [
+                _place(index, draw, clusters)
+                for index, draw in enumerate(self._draws)
+                if _is_worth(draw) and (clusters := self._clusters.get(_identity(self._meshes[draw.batch.mesh])))
+            ]
+        )
+
+
+def _place(index: int, draw: Draw, clusters: Clusters) -> _Placed:
+    """The clusters of one caster."""
+    ends = np.searchsorted(3 * clusters.first, [draw.first_index, draw.first_index + draw.index_count])
+    own = slice(*ends.tolist())
+    boxes = [placed_boxes(clusters.boxes[own], matrix) for matrix in draw.batch.matrices]
+    first, count = 3 * clusters.first[own], 3 * clusters.count[own]
+    owner = np.tile(np.arange(len(first)), len(boxes))
+    return _Placed(np.full(len(first), index), first, count, np.concatenate(boxes), owner)
+
+
+def _join(parts: Sequence[_Placed]) -> _Placed:
+    """The clusters of several casters."""
+    starts = np.cumsum([0, *(len(part.first) for part in parts)])
+    owners = [part.owner + start for part, start in zip(parts, starts, strict=False)]
+    none = np.zeros(0, np.int64)
+    return _Placed(
+        np.concatenate([none, *(part.caster for part in parts)]),
+        np.concatenate([none, *(part.first for part in parts)]),
+        np.concatenate([none, *(part.count for part in parts)]),
+        np.concatenate([np.zeros((0, 2, 3)), *(part.boxes for part in parts)]),
+        np.concatenate([none, *owners]),
+    )
 
 
 def _is_worth(draw: Draw) -> bool:

@@ -63,15 +63,17 @@ def placed_boxes(boxes: Float32Array, world_from_object: Float64Array) -> Float6
     return np.stack([middles - extents, middles + extents], axis=1)
 
 
-def runs(chosen: BoolArray, first: Int64Array, count: Int64Array) -> list[tuple[int, int]]:
-    """(first, count) of the stretches of what is chosen (C,): what begins where the one before ends goes with it."""
+def runs(chosen: BoolArray, owner: Int64Array, first: Int64Array, count: Int64Array) -> list[tuple[int, int, int]]:
+    """(owner, first, count) of the stretches of what is chosen (N,): of the same owner, each beginning where the one
+    before ends."""
     at = np.flatnonzero(chosen)
     if len(at) == 0:
         return []
-    ends = first[at] + count[at]
-    apart = np.flatnonzero(first[at[1:]] != ends[:-1]) + 1
-    starts = first[at[np.append(0, apart)]]
-    return list(zip(starts.tolist(), (ends[np.append(apart - 1, -1)] - starts).tolist(), strict=True))
+    owners, starts, ends = owner[at], first[at], first[at] + count[at]
+    begins = np.append(True, (starts[1:] != ends[:-1]) | (owners[1:] != owners[:-1]))
+    closes = np.append(begins[1:], True)
+    starts = starts[begins]
+    return list(zip(owners[begins].tolist(), starts.tolist(), (ends[closes] - starts).tolist(), strict=True))
 
 
 def _triangle_boxes(mesh: Mesh) -> tuple[Float32Array, Float32Array]:

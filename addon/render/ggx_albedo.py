@@ -14,7 +14,7 @@ _LARGEST_ROOT = 0.99  # √F0 of a dielectric: at 1 its index of refraction is i
 
 
 def ggx_albedo_table() -> Float32Array:
-    """(16, 32, 32, 4) float32, [√F0 · 15, n·v · 31, perceptual roughness · 31]; `common/bsdf.glsl` reads it.
+    """(16, 32, 32, 4) float32, [√F0 · 15, n·v · 31, perceptual roughness · 31]; `common/ggx.glsl` reads it.
 
     Of the share of unit light from everywhere that GGX reflects by scattering once (all for reflectance 1):
     E · what of it Schlick's weight (1 − cosθ)⁵ takes, in E · s, so that a dielectric of this F0 reflects

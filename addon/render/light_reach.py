@@ -9,6 +9,7 @@ d < R0/√ξ.
 
 from collections.abc import Sequence
 from math import hypot, inf, pi, tan
+from zlib import crc32
 
 import numpy as np
 
@@ -22,7 +23,7 @@ MANY_LIGHTS = 16
 
 _RANGE = 2**32
 _LIGHT_STEP = 0x9E3779B9
-"""2³² times the golden ratio's fraction: lights share out the numbers of one sample."""
+"""2³² times the golden ratio's fraction, which spreads similar keys (Knuth, The Art of Computer Programming, 6.4)."""
 _SAMPLE_STEP = 0x6A09E667
 """2³² times the fraction of √2, which no other sampling pattern steps by: samples share out those of one light."""
 
@@ -59,9 +60,9 @@ def full_reach(intensities: Float64Array, extents: Float64Array, threshold: floa
     return np.where(intensities > 0.0, extents + np.sqrt(intensities / (pi * threshold)), 0.0)
 
 
-def roulette(count: int, sample: int, seed: int) -> Float64Array:
-    """(L,) ξ in (0, 1] of `count` lights in a sample: even over the samples of a light and over a sample's lights."""
-    return _share(_light_steps(count, seed) + _sample_steps(np.array([sample])))
+def roulette(keys: Sequence[str], sample: int, seed: int) -> Float64Array:
+    """(L,) ξ in (0, 1] of the lights with these keys in a sample: even over the samples of each, whatever others do."""
+    return _share(_light_steps(keys, seed) + _sample_steps(np.array([sample])))
 
 
 def sampled_reach(full: Float64Array, xi: Float64Array) -> Float64Array:
@@ -69,9 +70,17 @@ def sampled_reach(full: Float64Array, xi: Float64Array) -> Float64Array:
     return full / np.sqrt(xi)
 
 
-def farthest_reach(full: Float64Array, samples: int, seed: int) -> Float64Array:
+def rounded_reach(full: Float64Array, reach: Float64Array) -> Float64Array:
+    """(L,) m: the least power of two times the full reach that `reach` (L,) does not exceed: a few values per light,
+    so that what was drawn for one sample serves others."""
+    with np.errstate(invalid="ignore"):
+        steps = np.ceil(np.log2(np.where(full > 0.0, reach, 1.0) / np.where(full > 0.0, full, 1.0)))
+    return full * 2.0 ** np.nan_to_num(steps)
+
+
+def farthest_reach(full: Float64Array, keys: Sequence[str], samples: int, seed: int) -> Float64Array:
     """(L,) m: how far each light reaches at most in the first `samples` samples."""
-    lights, steps = _light_steps(len(full), seed), np.sort(_sample_steps(np.arange(samples)))
+    lights, steps = _light_steps(keys, seed), np.sort(_sample_steps(np.arange(samples)))
     # The smallest sum modulo 2³² is that of the first step that wraps around, or of none.
     wrapping = np.searchsorted(steps, _RANGE - lights)
     smallest = lights + np.append(steps, 0)[wrapping]
@@ -116,9 +125,9 @@ def _share(steps: Int64Array) -> Float64Array:
     return (steps % _RANGE + 1) / _RANGE
 
 
-def _light_steps(count: int, seed: int) -> Int64Array:
-    start = int(np.random.default_rng(seed).integers(_RANGE)) if seed else _RANGE // 2
-    return (start + _LIGHT_STEP * np.arange(count, dtype=np.int64)) % _RANGE
+def _light_steps(keys: Sequence[str], seed: int) -> Int64Array:
+    start = int(np.random.default_rng(seed).integers(_RANGE)) if seed else 0
+    return np.array([(start + _LIGHT_STEP * crc32(key.encode())) % _RANGE for key in keys], np.int64)
 
 
 def _sample_steps(samples: Int64Array) -> Int64Array:

@@ -77,28 +77,36 @@ def square_points(points: Float64Array) -> Float64Array:
 
 
 def disk_points(points: Float64Array) -> Float64Array:
-    """Unit cube (N, 3) -> (x, y, 0) uniform in the unit disk (Shirley and Chiu 1997)."""
-    x, y, _ = square_points(points).T
-    wide = np.abs(x) > np.abs(y)
-    radius = np.where(wide, x, y)
-    along, across = np.where(wide, y, x), np.where(radius == 0.0, 1.0, radius)
-    angle = 0.25 * np.pi * along / across
-    angle = np.where(wide, angle, 0.5 * np.pi - angle)
-    return np.stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros_like(x)], axis=-1)
+    """Unit cube (N, 3) -> (x, y, 0) uniform in the unit disk; smooth, and periodic in the angle by itself."""
+    radius, angle = np.sqrt(folded(points[:, 0])), 2.0 * np.pi * points[:, 1]
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros_like(radius)], axis=-1)
 
 
-def ball_points(points: Float64Array) -> Float64Array:
-    """Unit cube (N, 3) -> points of the unit ball that are uniform in a disk from whatever side they are seen.
+def ball_points(numbers: Int64Array, count: int, shifts: Float64Array) -> Float64Array:
+    """Points (N, 3) of the unit ball that are uniform in a disk from whatever side they are seen; as `lattice_points`.
 
     Their density is 1/(π² √(1 − r²)), the inverse Abel transform of the disk's (Bracewell 1978, ch. 12): one point
-    serves every receiver, who sees it on the disk that faces him.
+    serves every receiver, who sees it on the disk that faces him. Each is followed by its mirror image, so that what is
+    linear over the light is integrated exactly.
     """
+    points = lattice_points(numbers // 2, (count + 1) // 2, shifts)
     share, radii = _ball_cdf()
-    radius = np.interp(points[:, 2], share, radii)
-    z = 1.0 - 2.0 * points[:, 0]
+    radius = np.interp(folded(points[:, 2]), share, radii) * np.where(numbers % 2, -1.0, 1.0)
+    z = 1.0 - 2.0 * folded(points[:, 0])
     around = np.sqrt(np.maximum(1.0 - z * z, 0.0))
     azimuth = 2.0 * np.pi * points[:, 1]
     return radius[:, None] * np.stack([around * np.cos(azimuth), around * np.sin(azimuth), z], axis=-1)
+
+
+def spiral_points(indices: Int64Array, count: int, shift: float) -> Float64Array:
+    """Points (N, 2) in [0, 1) with numbers `indices` (N,) of `count`: (azimuth, share of the sphere below).
+
+    On the sphere they are a Fibonacci spiral (Swinbank and Purser 2006), the evenest of simple patterns, in such an
+    order that any stretch of it is spread evenly, too. `shift`: turns it.
+    """
+    step, _, _ = _generators(count)
+    turn = indices * step % count
+    return np.stack([np.modf(turn * _RATIOS[1] + shift)[0], (turn + 0.5) / count], axis=-1)
 
 
 @lru_cache(maxsize=1)

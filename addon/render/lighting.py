@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The lights of one view on the GPU: what they are, and which point of each the current sample uses."""
 
-from collections.abc import Sequence
+from math import inf
 
 import moderngl
 import numpy as np
@@ -9,7 +9,7 @@ import numpy as np
 from ..scene import AreaShape, Light, LightKind, RenderSettings, Scene, World
 from ..scene.arrays import Float32Array, Float64Array, Int64Array
 from .device import Device
-from .light_reach import roulette, sampled_reach
+from .light_reach import roulette, rounded_reach, sampled_reach
 from .light_samples import (
     ball_points,
     disk_points,
@@ -17,6 +17,7 @@ from .light_samples import (
     lattice_points,
     light_shifts,
     points_used,
+    spiral_points,
     square_points,
 )
 from .light_table import TEXELS_PER_SAMPLE, as_texels, light_rows, mesh_light_rows, world_rows
@@ -42,6 +43,7 @@ class Lighting:
         self.preview = False
         self.points = np.zeros((0, 3))
         self.numbers = np.zeros(0, np.int64)
+        self._reach = np.zeros(0)
         self.samples = np.zeros((0, TEXELS_PER_SAMPLE, 4), np.float32)
 
     @property
@@ -57,7 +59,7 @@ class Lighting:
         self._rows = np.concatenate([light_rows(planned.lights, origin), mesh_light_rows(planned.mesh_lights)])
         keys = [light.key for light in (*planned.lights, *planned.mesh_lights)]
         self._shifts = light_shifts(keys, settings.seed)
-        self._world_shift = light_shifts(["world"], settings.seed)
+        self._world_shift = float(light_shifts(["world"], settings.seed)[0, 0])
         self._extended = np.array(
             [_is_extended(light) for light in planned.lights] + [True] * len(planned.mesh_lights), np.bool_
         )
@@ -72,7 +74,7 @@ class Lighting:
         cube = lattice_points(self.numbers, self._point_count, self._shifts)
         self.samples = np.zeros((self.plan.count, TEXELS_PER_SAMPLE, 4), np.float32)
         self.points = np.zeros((self.plan.count, 3))
-        offsets = np.zeros((lamps, 3)) if self.preview else _lamp_offsets(self.plan.lights, cube[:lamps])
+        offsets = np.zeros((lamps, 3)) if self.preview else self._lamp_offsets(cube[:lamps])
         self.samples[:lamps, 0, :3] = offsets
         for index, (light, offset) in enumerate(zip(self.plan.lights, offsets, strict=True)):
             self.points[index] = lamp_point(light, offset)
@@ -81,7 +83,8 @@ class Lighting:
             point, normal = light.point(cube[index])
             self.points[index] = point
             self.samples[index, 0, :3], self.samples[index, 1, :3] = point - self._origin, normal
-        self._reach(sample)
+        self.samples[: len(self._extended), 2, 2] = ~self._extended
+        self._draw_reach(sample)
         rows = self._rows
         if self.plan.world_directions:
             rows = np.concatenate([rows, self._world_rows(sample)])
@@ -92,11 +95,14 @@ class Lighting:
         """About half the distance between the points that the film's samples use of a light whose half size is 1."""
         return self._point_count**-0.5
 
-    def number(self, index: int) -> int:
-        """Which of its points a light uses; those of the world are new in every sample, a preview's are others."""
+    def state(self, index: int) -> tuple[int, float]:
+        """Which of its points a light uses, and how far (m) it reaches at most: what its shadows depend on.
+
+        Those of the world are new in every sample, a preview's are others.
+        """
         if index >= len(self.numbers):
-            return self._sample
-        return -1 if self.preview else int(self.numbers[index])
+            return self._sample, inf
+        return -1 if self.preview else int(self.numbers[index]), float(self._reach[index])
 
     def table(self) -> moderngl.Texture:
         """What the lights are: `light_table.light_rows`, an image of `as_texels`."""
@@ -121,21 +127,32 @@ class Lighting:
         numbers[self._extended] = held_points(int(self._extended.sum()), sample, self._settings.shadow_updates)
         return numbers
 
-    def _reach(self, sample: int) -> None:
+    def _lamp_offsets(self, cube: Float64Array) -> Float64Array:
+        """(L, 3) of each lamp: in the ball; of area lights in the square or disk, z = 0. `cube`: (L, 3) in [0, 1)."""
+        lights, lamps = self.plan.lights, len(self.plan.lights)
+        offsets = ball_points(self.numbers[:lamps], self._point_count, self._shifts[:lamps])
+        for points, shape in ((square_points(cube), AreaShape.RECTANGLE), (disk_points(cube), AreaShape.ELLIPSE)):
+            chosen = [light.kind is LightKind.AREA and light.shape is shape for light in lights]
+            offsets[chosen] = points[chosen]
+        return offsets
+
+    def _draw_reach(self, sample: int) -> None:
         lamps = len(self.plan.lights)
         self.samples[:, 2, :2] = np.inf
+        self._reach = np.full(self.plan.count, inf)
         if self.plan.many:
             full = np.array(self.plan.reach)
-            reach = sampled_reach(full, roulette(lamps, sample, self._settings.seed))
+            keys = [light.key for light in self.plan.lights]
+            reach = sampled_reach(full, roulette(keys, sample, self._settings.seed))
             self.samples[:lamps, 2, 0], self.samples[:lamps, 2, 1] = reach**2, full**2
+            self._reach[:lamps] = rounded_reach(full, reach)
 
     def _world_rows(self, sample: int) -> Float32Array:
         count = self.plan.world_directions
         assert self._world_sampler is not None
         total = count * self._settings.samples
         numbers = sample * count + np.arange(count)
-        cube = lattice_points(numbers, total, np.repeat(self._world_shift, count, axis=0))
-        directions, weights = self._world_sampler.directions(cube[:, :2])
+        directions, weights = self._world_sampler.directions(spiral_points(numbers, total, self._world_shift))
         self.points[-count:] = directions
         return world_rows(directions, weights / count, self._world)
 
@@ -152,7 +169,7 @@ class Lighting:
 
 
 def lamp_point(light: Light, offset: Float64Array) -> Float64Array:
-    """World-space point (3,) of a lamp at an offset (3,) as `Lighting.samples` holds it; of a sun the direction to it."""
+    """World-space point (3,) of a lamp at an offset (3,) as in `Lighting.samples`; of a sun the direction to it."""
     rotation, center = light.world_from_light[:3, :3], light.world_from_light[:3, 3]
     if light.kind is LightKind.SUN:
         return sun_direction(rotation[:, 2], 0.5 * light.angle, offset)
@@ -171,15 +188,6 @@ def sun_direction(axis: Float64Array, half_angle: float, offset: Float64Array) -
     if share == 0.0:
         return axis
     return across * np.sqrt(drop * (2.0 - drop) / share) + axis * (1.0 - drop)
-
-
-def _lamp_offsets(lights: Sequence[Light], cube: Float64Array) -> Float64Array:
-    """(L, 3) offsets for points (L, 3) of the unit cube: in the ball; area lights: in the square or disk, z = 0."""
-    offsets = ball_points(cube)
-    for points, shape in ((square_points(cube), AreaShape.RECTANGLE), (disk_points(cube), AreaShape.ELLIPSE)):
-        chosen = [light.kind is LightKind.AREA and light.shape is shape for light in lights]
-        offsets[chosen] = points[chosen]
-    return offsets
 
 
 def _is_extended(light: Light) -> bool:

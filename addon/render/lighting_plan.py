@@ -15,8 +15,8 @@ class LightPlan:
     """The lights of a picture.
 
     `lights`, `mesh_lights`: sampled every sample. `reach` (m) of each of `lights`: beyond it one is only sampled now
-    and then. `world_directions`: from how many directions the world lights each sample. `preview`: whether the first sample
-    shows lights by closed forms and their shadows from their centres. `casts_shadows`: whether anything does.
+    and then. `world_directions`: from how many directions the world lights each sample. `preview`: whether the first
+    sample shows lights by closed forms and their shadows from their centres. `casts_shadows`: whether anything does.
     """
 
     lights: tuple[Light, ...] = ()
@@ -78,7 +78,8 @@ def _lights_in_reach(
     intensities = np.array([peak_intensity(light) for light in scene.lights])
     extents = np.array([extent(light) for light in scene.lights])
     full = full_reach(intensities, extents, settings.light_threshold)
-    farthest = farthest_reach(full, settings.samples, settings.seed)
+    keys = [light.key for light in scene.lights]
+    farthest = farthest_reach(full, keys, settings.samples, settings.seed)
     lost = dict(lights_out_of_reach(scene.lights, farthest, scene, camera))
     left_out += [(f"light “{scene.lights[index].name}”", reason) for index, reason in lost.items()]
     return tuple(light for index, light in enumerate(scene.lights) if index not in lost)

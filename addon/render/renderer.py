@@ -10,6 +10,7 @@ from ..scene.arrays import Float32Array
 from ..scene.correspondence import Correspondence
 from .device import Device
 from .draws import DrawLists
+from .environment import EnvironmentTextures
 from .film import Film
 from .geometry import GeometryStore
 from .images import ImageStore
@@ -37,6 +38,7 @@ class Renderer:
         self._images = ImageStore(device)
         self._oracle = OracleState()
         self._lighting = Lighting(device)
+        self._environment = EnvironmentTextures(device)
         self._film = Film(device)
         self._timers = PassTimers(device)
         self._passes: dict[str, Pass] = {}
@@ -80,6 +82,7 @@ class Renderer:
             film=self._film,
             oracle=oracle,
             lighting=self._lighting,
+            environment=self._environment,
             correspondence=self._correspondence,
             scene=scene,
             settings=settings,
@@ -141,6 +144,8 @@ class Renderer:
             sizes["shadow maps"] = shadows.bytes
         sizes["geometry"] = self._geometry.bytes()
         sizes["images"] = self._images.bytes()
+        if frame.scene.world.environment is not None:
+            sizes["world"] = self._environment.bytes()
         return RenderStatistics(
             upload_s=self._upload_seconds,
             passes=self._timers.milliseconds(),
@@ -165,6 +170,7 @@ class Renderer:
         self._geometry.release()
         self._pool.release()
         self._lighting.release()
+        self._environment.release()
         self._oracle = OracleState()
         self._correspondences.clear()
         self._timers.forget()

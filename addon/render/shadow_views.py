@@ -14,6 +14,13 @@ SMALLEST_SIZE = 32
 WIDEST_SINGLE = pi / 3.0
 """Half angle (rad) of the widest cone that one map covers; wider ones take the faces of a cube."""
 
+_SMALL_SHARE = 0.5
+"""Share of its width below which a map shows only what is seen, not all that the light shines on: otherwise it need not
+be drawn again when the camera moves."""
+
+NARROWEST = 1e-3
+"""Half angle (rad) of the narrowest cone that a map is drawn for."""
+
 MOST_CASCADES = 4
 
 _FINEST_SHARE = 0.1
@@ -32,6 +39,16 @@ class ShadowMap:
 
     camera: Camera
     size: int
+
+
+@dataclass(frozen=True)
+class Fineness:
+    """How fine a light's maps are: at most `largest` texels a side; `texels_per_pixel` where that allows it, but texels
+    not smaller than `smallest` (m, at a distance of 1 m from a light that is not infinitely far)."""
+
+    largest: int
+    texels_per_pixel: float = 1.0
+    smallest: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -58,15 +75,21 @@ class LocalReceivers:
             within &= (angle < cone.half_angle + slack) | (distance <= radius)
         self._corners = receivers.corners[within] - position
         self._extent = extent
-        # A texel should not be larger than a pixel, both seen from the light.
+        self._center = position
+        # How wide a pixel is, seen from the light.
         nearest = np.maximum(distance - radius, 0.5 * distance)
-        self._texel_angles = receivers.pixels[within] / np.maximum(nearest[within], 1e-12)
-        self.farthest = float((distance + radius)[within].max(initial=0.0))
+        self._pixel_angles = receivers.pixels[within] / np.maximum(nearest[within], 1e-12)
+        self.farthest = min(float((distance + radius)[within].max(initial=0.0)), reach + extent)
 
     @property
     def any(self) -> bool:
         """Whether the light reaches anything that is seen."""
         return len(self._corners) > 0
+
+    @property
+    def all(self) -> BoolArray:
+        """(P,) every one of them."""
+        return np.ones(len(self._corners), np.bool_)
 
     def faces(self) -> BoolArray:
         """(6, P) which receivers each face of a cube about the light may see: +X, −X, +Y, −Y, +Z, −Z."""
@@ -80,29 +103,50 @@ class LocalReceivers:
                 seen.append(~np.logical_or.reduce(outside) & (ahead > 0.0).any(axis=1))
         return np.array(seen)
 
-    def size(self, width: float, largest: int, texel_angle: float, seen: BoolArray | None = None) -> int:
-        """Texels a side for a map whose window is `width` wide at distance 1: a power of two.
+    def map(
+        self, point: Float64Array, axis: Float64Array, half: float, fineness: Fineness, seen: BoolArray
+    ) -> ShadowMap:
+        """What those of them that are `seen` (P,) need of a map from a point of the light along an axis.
 
-        `texel_angle`: the smallest that the light's own limit allows, m at a distance of 1 m.
+        `half`: half width, at distance 1, of all that the map may show; where they fill little of it, it shows them only.
         """
-        angles = self._texel_angles if seen is None else self._texel_angles[seen]
-        wanted = max(float(np.quantile(angles, _FINEST_SHARE)), texel_angle, 1e-12)
-        return _power_of_two(width / wanted, largest)
+        frame = look_along(axis)
+        middle, half = self._window(self._corners[seen] - (point - self._center), frame, half)
+        angle = float(np.quantile(self._pixel_angles[seen], _FINEST_SHARE)) / fineness.texels_per_pixel
+        size = _power_of_two(2.0 * half / max(angle, fineness.smallest, 1e-12), fineness.largest)
+        half *= size / (size - 2.0)  # the outermost texels are a margin, so that a lookup beside the edge stays inside
+        x, y = middle
+        reach = _rounded_up(max(self.farthest, 1e-6))
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = frame, point
+        return ShadowMap(Camera(pose, (x - half, x + half, y - half, y + half), _NEAREST_SHARE * reach, reach), size)
+
+    @staticmethod
+    def _window(corners: Float64Array, frame: Float64Array, half: float) -> tuple[tuple[float, float], float]:
+        """Middle and half width, at distance 1, of what corners (P, 8, 3) need of a window that is `half` wide.
+
+        In steps, so that it stays the same while the camera moves a little.
+        """
+        seen = corners.reshape(-1, 3) @ frame
+        if (seen[:, 2] > -1e-9).any():  # one beside or behind the light is everywhere
+            return (0.0, 0.0), half
+        projected = np.clip(seen[:, :2] / -seen[:, 2:], -half, half)
+        low, high = projected.min(axis=0), projected.max(axis=0)
+        needed = 0.5 * _rounded_up(1.15 * max(float((high - low).max()), 1e-9))
+        if needed > _SMALL_SHARE * half:
+            return (0.0, 0.0), half
+        step = needed / 8.0
+        x, y = (step * floor(value / step + 0.5) for value in (0.5 * (low + high)).tolist())
+        return (x, y), needed
 
 
-def cone_map(position: Float64Array, cone: Cone, receivers: LocalReceivers, largest: int, texel: float) -> ShadowMap:
+def cone_map(point: Float64Array, cone: Cone, receivers: LocalReceivers, fineness: Fineness) -> ShadowMap:
     """The one map of a light that shines in a narrow cone."""
-    half = tan(min(cone.half_angle, WIDEST_SINGLE))
-    size = receivers.size(2.0 * half, largest, texel)
-    # The outermost texels are a margin, so that a lookup beside the edge stays inside.
-    half *= size / (size - 2.0)
-    camera = _perspective(position, cone.axis, (-half, half, -half, half), receivers.farthest)
-    return ShadowMap(camera, size)
+    half = tan(min(max(cone.half_angle, NARROWEST), WIDEST_SINGLE))
+    return receivers.map(point, cone.axis, half, fineness, receivers.all)
 
 
-def cube_maps(
-    position: Float64Array, receivers: LocalReceivers, largest: int, texel: float
-) -> tuple[ShadowMap | None, ...]:
+def cube_maps(point: Float64Array, receivers: LocalReceivers, fineness: Fineness) -> tuple[ShadowMap | None, ...]:
     """The six faces of a cube about a light, None where a face sees nothing that is seen."""
     maps: list[ShadowMap | None] = []
     for face, seen in enumerate(receivers.faces()):
@@ -111,19 +155,17 @@ def cube_maps(
             continue
         axis = np.zeros(3)
         axis[face // 2] = -1.0 if face % 2 else 1.0
-        size = receivers.size(2.0, largest, texel, seen)
-        half = size / (size - 2.0)
-        maps.append(ShadowMap(_perspective(position, axis, (-half, half, -half, half), receivers.farthest), size))
+        maps.append(receivers.map(point, axis, 1.0, fineness, seen))
     return tuple(maps)
 
 
 def sun_maps(
-    direction: Float64Array, receivers: Receivers, casters: Float64Array, size: int, texel: float, cascades: int
+    direction: Float64Array, receivers: Receivers, casters: Float64Array, fineness: Fineness, cascades: int
 ) -> tuple[ShadowMap, ...]:
     """Maps of light that comes along `direction` (3,), nearest part of the view first.
 
-    `casters` (K, 2, 3): bounds of what may cast shadows, world space. At most `cascades` maps, of `size` texels a side;
-    `texel` (m): smallest that the light's own limit allows.
+    `casters` (K, 2, 3): bounds of what may cast shadows, world space. At most `cascades` maps, which are as large as
+    allowed.
     """
     if receivers.count == 0:
         return ()
@@ -132,14 +174,14 @@ def sun_maps(
     nearest = float(np.quantile(receivers.near, 0.02))
     farthest = float(receivers.far.max())
     pixel = receivers.pixel_size + max(nearest, farthest * 1e-4) * receivers.pixel_slope
-    coarseness = whole / (size * max(pixel, texel, 1e-12))
+    coarseness = whole / (fineness.largest * max(pixel, fineness.smallest, 1e-12))
     count = 1
     if coarseness > 2.0 and receivers.pixel_slope > 0.0:
         count = min(ceil(log(coarseness / 2.0) / log(_CASCADE_RATIO)) + 1, cascades)
     start = max(nearest, farthest * 1e-4)
     ends = [start * (farthest / start) ** ((i + 1) / count) for i in range(count - 1)]
     parts = [receivers.between(low, high) for low, high in zip([0.0, *ends], [*ends, farthest], strict=True)]
-    return tuple(_orthographic(part, frame, casters, size, texel) for part in parts if part.count)
+    return tuple(_orthographic(part, frame, casters, fineness) for part in parts if part.count)
 
 
 def look_along(direction: Float64Array) -> Float64Array:
@@ -153,23 +195,12 @@ def look_along(direction: Float64Array) -> Float64Array:
     return np.stack([x, y, z], axis=1)
 
 
-def _perspective(
-    position: Float64Array, axis: Float64Array, window: tuple[float, float, float, float], farthest: float
-) -> Camera:
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = look_along(axis), position
-    reach = _rounded_up(max(farthest, 1e-6))
-    return Camera(pose, window, _NEAREST_SHARE * reach, 2.0 * reach)
-
-
 def _extent(receivers: Receivers, frame: Float64Array) -> float:
     corners = receivers.corners.reshape(-1, 3) @ frame[:, :2]
     return float((corners.max(axis=0) - corners.min(axis=0)).max())
 
 
-def _orthographic(
-    receivers: Receivers, frame: Float64Array, casters: Float64Array, size: int, texel: float
-) -> ShadowMap:
+def _orthographic(receivers: Receivers, frame: Float64Array, casters: Float64Array, fineness: Fineness) -> ShadowMap:
     """One map around receivers. Its place is snapped, so that it stays the same while the camera moves a little."""
     corners = receivers.corners.reshape(-1, 3) @ frame
     low, high = corners.min(axis=0), corners.max(axis=0)
@@ -185,8 +216,8 @@ def _orthographic(
     pose[:3, :3] = frame
     pose[:3, 3] = frame @ np.array([x, y, end + depth + step])
     half = 0.5 * side
-    wanted = _power_of_two(side / texel, size) if texel > 0.0 else size
-    return ShadowMap(Camera(pose, (-half, half, -half, half), 0.0, depth + step, orthographic=True), wanted)
+    size = _power_of_two(side / max(fineness.smallest, 1e-12), fineness.largest)
+    return ShadowMap(Camera(pose, (-half, half, -half, half), 0.0, depth + step, orthographic=True), size)
 
 
 def _greatest(bounds: Float64Array, axis: Float64Array) -> Float64Array:

@@ -15,31 +15,37 @@ from functools import lru_cache
 import numpy as np
 
 from ..scene.arrays import Float32Array, Float64Array
-from ..scene.equirectangular import box_sums, look_up, texel_directions, texel_solid_angles
+from ..scene.equirectangular import box_sums, coarsened, look_up, texel_directions, texel_solid_angles
 
 ROWS, COLUMNS = 161, 320
 DEGREES = 160
 """Degrees 0 … 159 are kept: details of about 1°."""
 
+_LARGEST_WIDTH = 1280  # columns of which harmonics are found; wider maps are gathered first
+_COARSE = (3 * (ROWS - 1), 3 * COLUMNS)  # to which larger maps are averaged first
 _ANGLES = 4096  # at which kernels are integrated
 
 
 def harmonics(pixels: Float32Array) -> Float64Array:
     """(orders, degrees, 6) float64: real, then imaginary parts of three channels' harmonics of a map (H, W, 3).
 
-    The map's flux is gathered at the nearest nodes, none is lost; coarser maps are interpolated first.
+    Each row's flux is shared between the two nearest rows of nodes, which moves nothing on average.
     """
+    pixels = coarsened(pixels, *_COARSE)
     height, width = pixels.shape[:2]
     if height < ROWS - 1 or width < COLUMNS:
-        pixels, height, width = _refined(pixels)
-    flux = pixels * texel_solid_angles(height, width)[:, None, None]
-    row_edges = np.clip((np.arange(ROWS + 1) - 0.5) / (ROWS - 1), 0.0, 1.0) * height
-    by_row = box_sums(flux.reshape(height, -1).T, row_edges).T.reshape(ROWS, width, 3)
-    by_cell = box_sums(np.moveaxis(by_row, 1, 2), np.linspace(0.0, width, COLUMNS + 1))
-    # Cells lie between the columns of nodes: half a column further.
-    spectrum = np.fft.rfft(by_cell, axis=-1)[..., :DEGREES]
-    spectrum *= np.exp(-1j * np.pi / COLUMNS * np.arange(DEGREES))
-    waves = np.moveaxis(spectrum, 2, 0)
+        height, width = max(height, 2 * (ROWS - 1)), max(width, 2 * COLUMNS)
+        pixels = look_up(pixels, texel_directions(height, width)).astype(np.float32)
+    columns = min(width, _LARGEST_WIDTH)
+    rows = np.moveaxis(pixels, 2, 1)
+    by_cell = rows if columns == width else box_sums(rows, np.linspace(0.0, width, columns + 1)) * (columns / width)
+    # Azimuth 0 of the harmonics is the edge of the map, half a texel before its first column.
+    phase = np.exp(-1j * np.pi / columns * np.arange(DEGREES))
+    spectrum = np.fft.rfft(by_cell, axis=-1)[..., :DEGREES] * phase
+    flux = spectrum * texel_solid_angles(height, columns)[:, None, None]
+    place = (np.arange(height) + 0.5) / height * (ROWS - 1)
+    shares = np.maximum(1.0 - np.abs(np.arange(ROWS)[:, None] - place), 0.0)
+    waves = np.moveaxis((shares @ flux.reshape(height, -1)).reshape(ROWS, 3, DEGREES), 2, 0)
     return _legendre() @ np.concatenate([waves.real, waves.imag], axis=-1)
 
 
@@ -86,12 +92,6 @@ def cosine_lobe() -> Float64Array:
         factors[degree] = sign * 2.0 * np.pi * ratio / ((degree + 2) * (degree - 1))
         ratio *= (degree + 1.0) / (degree + 2.0)
     return factors
-
-
-def _refined(pixels: Float32Array) -> tuple[Float32Array, int, int]:
-    """A map interpolated at twice as many texels as there are nodes."""
-    height, width = 2 * (ROWS - 1), 2 * COLUMNS
-    return look_up(pixels, texel_directions(height, width)).astype(np.float32), height, width
 
 
 @lru_cache(maxsize=1)

@@ -5,9 +5,10 @@ import numpy as np
 
 from ..scene import World
 from ..scene.arrays import Float32Array, Float64Array, Int64Array
-from ..scene.equirectangular import box_sums, look_up, texel_coordinates, texel_solid_angles
+from ..scene.equirectangular import box_sums, coarsened, look_up, texel_coordinates, texel_solid_angles
 
 _LARGEST_TABLE = (256, 512)
+_COARSE = (512, 1024)  # to which larger maps are averaged first
 _UNIFORM_SHARE = 0.05
 """Share of the samples that are drawn from everywhere alike: no direction's weight is more than what drawing all of
 them so would give, divided by this."""
@@ -73,15 +74,16 @@ class WorldSampler:
 
 
 def _cell_luminances(pixels: Float32Array, radiance: Float64Array) -> Float64Array:
-    """(H, W) mean luminance of a map (h, w, 3) times `radiance`, interpolated, in at most 256 × 512 cells.
+    """(H, W) mean luminance, up to a factor, of a map (h, w, 3) times `radiance` in at most 256 × 512 cells.
 
     Over one texel, bilinear interpolation has a mean of ¾ the texel and ⅛ either neighbour, along each axis.
     """
-    luminance = pixels @ (_LUMINANCE * radiance)
+    weights = _LUMINANCE * radiance / max(float(radiance.max()), np.finfo(np.float64).tiny)
+    luminance = coarsened(pixels, *_COARSE) @ weights.astype(np.float32)
     beside = np.pad(luminance, ((0, 0), (1, 1)), mode="wrap")
-    luminance = 0.75 * luminance + 0.125 * (beside[:, :-2] + beside[:, 2:])
+    luminance = np.float32(0.75) * luminance + np.float32(0.125) * (beside[:, :-2] + beside[:, 2:])
     above = np.pad(luminance, ((1, 1), (0, 0)), mode="edge")
-    luminance = 0.75 * luminance + 0.125 * (above[:-2] + above[2:])
+    luminance = np.float32(0.75) * luminance + np.float32(0.125) * (above[:-2] + above[2:])
     rows, columns = (min(size, largest) for size, largest in zip(luminance.shape, _LARGEST_TABLE, strict=True))
     by_column = box_sums(luminance, np.linspace(0.0, luminance.shape[1], columns + 1))
     cells = box_sums(by_column.T, np.linspace(0.0, luminance.shape[0], rows + 1)).T

@@ -64,3 +64,23 @@ def box_sums(values: Float32Array | Float64Array, edges: Float64Array) -> Float6
     before = np.zeros((*values.shape[:-1], count + 1))
     np.cumsum(values, axis=-1, out=before[..., 1:])
     return np.diff(before[..., whole] + values[..., whole] * (edges - whole), axis=-1)
+
+
+def coarsened(pixels: Float32Array, height: int, width: int) -> Float32Array:
+    """(H / k, W / k, C) float32: means over the solid angle of k × k texels of a map (H, W, C).
+
+    k is the largest number that divides both sizes and leaves at least `height` × `width` texels; 1 leaves the map as
+    it is.
+    """
+    rows, columns = pixels.shape[:2]
+    fitting = range(1, max(min(rows // height, columns // width), 1) + 1)
+    factor = max(k for k in fitting if rows % k == 0 and columns % k == 0)
+    if factor == 1:
+        return pixels
+    weights = texel_solid_angles(rows, 1).reshape(-1, factor)
+    weights = (weights / weights.sum(axis=1, keepdims=True) / factor).astype(np.float32)
+    means = np.zeros((rows // factor, columns // factor, pixels.shape[2]), np.float32)
+    for row in range(factor):
+        for column in range(factor):
+            means += pixels[row::factor, column::factor] * weights[:, row, None, None]
+    return means

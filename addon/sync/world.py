@@ -12,14 +12,14 @@ from ..scene import EnvironmentMap, Light, World
 from ..scene.arrays import Color, Float32Array, Float64Array
 from ..scene.equirectangular import texel_directions
 from ..scene.versions import new_version
-from .changes import Messages
+from .changes import Messages, same_fields
 from .materials import ImageTable, has_nodes
 from .materials.graph import find_output, find_source
 from .materials.operations import LARGEST
 from .sky import Sky
 from .sun import sun_light
 from .world_fields import (
-    LARGEST_WIDTH,
+    LARGEST_SIZE,
     Constant,
     EnvironmentImage,
     Field,
@@ -56,14 +56,23 @@ class WorldTable:
     def __init__(self) -> None:
         self._content: tuple[object, ...] = ()
         self._map: EnvironmentMap | None = None
+        self._world = World()
 
     def read(
         self, depsgraph: bpy.types.Depsgraph, images: ImageTable, messages: Messages
     ) -> tuple[World, tuple[Light, ...]]:
-        """The view layer's world, its own or the scene's, and the lights in it.
+        """The view layer's world, its own or the scene's, and the lights in it; the same `World` where it is equal.
 
         Black where the layer has no Environment and without a world or surface. What cannot be rendered is told.
         """
+        world, lights = self._read(depsgraph, images, messages)
+        if not same_fields(world, self._world):
+            self._world = world
+        return self._world, lights
+
+    def _read(
+        self, depsgraph: bpy.types.Depsgraph, images: ImageTable, messages: Messages
+    ) -> tuple[World, tuple[Light, ...]]:
         scene: Any = depsgraph.scene_eval
         view_layer: Any = depsgraph.view_layer_eval
         world = view_layer.world_override or scene.world
@@ -134,7 +143,7 @@ def _frame(shown: Field) -> _Frame:
             return _Frame(*image.size, rotation)
     if not images:
         return _Frame(*_PROCEDURAL_SIZE, None)
-    width = min(max(image.size[1] * (2 if image.mirror_ball else 1) for image in images), LARGEST_WIDTH)
+    width = min(max(image.size[1] * (2 if image.mirror_ball else 1) for image in images), LARGEST_SIZE)
     return _Frame(max(width // 2, 1), width, None)
 
 

@@ -24,8 +24,8 @@ from .sky_preetham import PreethamSky, preetham_radiance
 Operation = Callable[..., Float64Array]
 """Of arrays (n, 3), or (1, 3) where all directions have one value, to another such; equal ones compute the same."""
 
-LARGEST_WIDTH = 4096
-"""Texels of a map from left to right; larger images are halved until they fit."""
+LARGEST_SIZE = 4096
+"""Most texels of a map along either axis; larger images are halved until they fit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,15 +122,15 @@ class EnvironmentImage(Field):
     def size(self) -> tuple[int, int]:
         """(H, W) of `pixels`."""
         height, width = self.image.pixels.shape[:2]
-        while width > LARGEST_WIDTH:
+        while max(height, width) > LARGEST_SIZE:
             height, width = -(-height // 2), -(-width // 2)
         return height, width
 
     @cached_property
     def pixels(self) -> Float32Array:
-        """(H, W, 3) scene-linear, finite and ≥ 0, at most `LARGEST_WIDTH` wide."""
+        """(H, W, 3) scene-linear, finite and ≥ 0, at most `LARGEST_SIZE` wide and high."""
         pixels = np.maximum(linear(self.image)[..., :3], np.float32(0.0))
-        while pixels.shape[1] > LARGEST_WIDTH:
+        while max(pixels.shape[:2]) > LARGEST_SIZE:
             pixels = _halved(pixels)
         return np.ascontiguousarray(pixels)
 

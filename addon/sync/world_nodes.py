@@ -21,7 +21,7 @@ from .materials.surfaces import evaluate_surface
 from .sky import SMALLEST_SUN, Air, Sky
 from .sky_preetham import PreethamSky
 from .world_colors import COLOR_READERS, as_value, mean_value, mixed, unit_range
-from .world_fields import LARGEST_WIDTH, Constant, EnvironmentImage, Field, SkyTexture, add, computed, multiply
+from .world_fields import LARGEST_SIZE, Constant, EnvironmentImage, Field, SkyTexture, add, computed, multiply
 from .world_vectors import DIRECTION, GRADIENTS, VECTOR_READERS
 
 BLACK = Constant((0.0, 0.0, 0.0))
@@ -109,10 +109,10 @@ def _environment_texture(source: Source, evaluator: WorldEvaluator) -> Field:
     if node.interpolation == "Closest":
         evaluator.warn(node, "its pixels are interpolated linearly, for now")
     image = evaluator.images.mirror(node, evaluator.owner).image
-    if image.pixels.shape[1] > LARGEST_WIDTH:
-        text = f"image “{image.name}” is {image.pixels.shape[1]} pixels wide; it is halved until it has {LARGEST_WIDTH}"
-        evaluator.warn(node, f"{text} or fewer")
-    return EnvironmentImage((evaluator.vector(source),), image, node.projection == "MIRROR_BALL")
+    texture = EnvironmentImage((evaluator.vector(source),), image, node.projection == "MIRROR_BALL")
+    if texture.size != image.pixels.shape[:2]:
+        evaluator.warn(node, f"image “{image.name}” is larger than {LARGEST_SIZE} pixels; it is halved until it is not")
+    return texture
 
 
 def _gradient_texture(source: Source, evaluator: WorldEvaluator) -> Field:

@@ -5,16 +5,25 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import OpenEXR
 from PIL import Image, ImageDraw
 
 CAPTION = 22
 """Height in pixels of the line above each picture."""
 
 
-def read(path: Path) -> np.ndarray:
-    """An 8-bit picture as (H, W, 3) float32 in 0…1, encoded as it is."""
-    with Image.open(path) as image:
-        return np.asarray(image.convert("RGB"), np.float32) / 255.0
+def combined(path: Path) -> np.ndarray:
+    """Scene-linear RGB (H, W, 3) float32 of the first Combined pass of an EXR file that Blender wrote."""
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        channels = {name: channel.pixels for part in file.parts for name, channel in part.channels.items()}
+    group = next(name.removesuffix(".R") for name in channels if name.endswith("Combined.R"))
+    return np.stack([np.asarray(channels[f"{group}.{letter}"], np.float32) for letter in "RGB"], axis=-1)
+
+
+def shown(linear: np.ndarray) -> np.ndarray:
+    """Scene-linear values as Blender's view transform Standard shows them: cut to 0…1, encoded after IEC 61966-2-1."""
+    values = np.clip(linear, 0.0, 1.0)
+    return np.where(values <= 0.0031308, 12.92 * values, 1.055 * values ** (1.0 / 2.4) - 0.055).astype(np.float32)
 
 
 def flip(reference: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, float]:

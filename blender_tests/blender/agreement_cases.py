@@ -172,7 +172,7 @@ def pierced_caster(*size: int, **surfaces: Any) -> bpy.types.Scene:
     scene = still_life(*size, **surfaces)
     card = plane(1.6, pierced(), (-0.4, -0.1, 1.6))
     card.visible_camera = False  # only its shadow is judged: its alpha is tested where Cycles mixes
-    lamp(scene, "POINT", energy=120.0, shadow_soft_size=0.1)
+    lamp(scene, "POINT", energy=120.0, shadow_soft_size=0.03)  # its many edges would be nothing but penumbra
     return scene
 
 

@@ -161,7 +161,8 @@ def test_statistics_have_the_documented_keys(plane_scene, tmp_path):
     assert last["samples"] == 2
     assert last["triangles"] == 2
     assert 0 < last["sync_s"] < last["first_picture_s"] <= last["total_s"]
-    assert [item["name"] for item in last["passes"]] == ["gbuffer", "direct", "composite"]
+    names = [item["name"] for item in last["passes"]]
+    assert names == ["gbuffer", "depth_tiles", "shadow_maps", "direct", "composite"]
 
 
 def test_a_time_limit_ends_after_the_first_sample_at_least(plane_scene, tmp_path):

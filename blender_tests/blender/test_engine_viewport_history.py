@@ -15,7 +15,7 @@ from blender_tests.blender.engine_fixtures import camera_at, idle, session_fixtu
 
 BACK = builders.quad("back", half=3.0)
 FRONT = builders.quad("front", z=1.0, half=0.5)
-SCENE = builders.scene(BACK, FRONT, lights=(builders.light(),))
+SCENE = builders.scene(BACK, FRONT, lights=(builders.light(casts_shadow=False),))
 SIZE = {"width": 24, "height": 16, "samples": 3}
 SETTINGS = {
     variant: RenderSettings(**SIZE, variant=variant, debug_view=DebugView.DIRECT, debug_layer=1) for variant in Variant

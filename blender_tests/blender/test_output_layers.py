@@ -157,6 +157,7 @@ def test_file_names_follow_blenders_conventions(template, view_layer, expected):
 
 def test_a_render_saves_both_files(plane_scene, tmp_path):
     add_plane("Behind", -20.0, 20.0, -2.0)
+    bpy.data.lights["Sun"].use_shadow = False  # what is behind is lit too
     ours = plane_scene.deep_gbuffer
     ours.layers, ours.save_layers, ours.save_deep = 3, True, True
     ours.layers_path = str(tmp_path / "out" / "shot_###")

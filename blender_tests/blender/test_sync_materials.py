@@ -373,18 +373,6 @@ def test_constant_world(empty_scene):
     assert texts == ()
 
 
-def test_environment_image_becomes_its_mean(empty_scene):
-    def build(tree, background):
-        node = tree.nodes.new("ShaderNodeTexEnvironment")
-        node.image = make_image(color=(0.5, 1.0, 0.0, 1.0), is_float=True)
-        tree.links.new(node.outputs[0], background.inputs["Color"])
-        background.inputs["Strength"].default_value = 3.0
-
-    radiance, texts = world_radiance(empty_scene, build)
-    assert radiance == pytest.approx((1.5, 3.0, 0.0))
-    assert_texts(texts, "“Sky”", "“Environment Texture”")
-
-
 def test_no_world_is_black(empty_scene):
     assert sync().scene.world.radiance == (0, 0, 0)
 

@@ -44,11 +44,12 @@ def light(kind, position=(0.0, 0.0, 0.0), axis=(0.0, 0.0, -1.0), emission=(1.0, 
     return Light("light", "light", kind, turned(position, axis), emission, **arguments)
 
 
-def unit_disk():
+def unit_disk(count=GRID):
     """(N, 2) points and (N,) shares of the unit disk's area: Gauss–Legendre in r², so that the weights are exact."""
-    nodes, weights = np.polynomial.legendre.leggauss(GRID)
-    radius, angle = np.meshgrid(np.sqrt(0.5 * (nodes + 1.0)), 2 * np.pi * (np.arange(GRID) + 0.5) / GRID, indexing="ij")
-    share = np.repeat(0.5 * weights / GRID, GRID)
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    turns = (np.arange(count) + 0.5) / count
+    radius, angle = np.meshgrid(np.sqrt(0.5 * (nodes + 1.0)), 2 * np.pi * turns, indexing="ij")
+    share = np.repeat(0.5 * weights / count, count)
     return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1).reshape(-1, 2), share
 
 
@@ -158,12 +159,53 @@ def test_irradiance_is_that_of_all_points_of_the_light(name):
     np.testing.assert_allclose(result[clear], np.repeat(expected[clear, None], 3, axis=1), rtol=2e-3)
 
 
+@pytest.mark.parametrize("sine", [1e-5, 5e-3, 0.1, 0.3, 0.9])
+def test_the_horizon_cuts_through_a_cone(sine):
+    """At any height of its axis, against quadrature; relative to the greatest factor of those that are cut."""
+    height = np.linspace(-1.2, 1.2, 25)[1:-1] * sine
+    height = height[np.abs(height) < 1.0]
+    body = "vec4 evaluate() { return vec4(cone_cosine_factor(cone.x, cone.y)); }"
+    cones = np.column_stack([height, np.full(len(height), sine)])
+    result = evaluate(INCLUDES, body, {"cone": cones}, defines=DEFINES)[:, 0]
+    points, share = unit_disk(600)
+    across, along = sine * points[:, 0], np.sqrt(1.0 - sine**2 * (points**2).sum(axis=1))
+    expected = [(np.maximum(across * np.sqrt(1.0 - z * z) + along * z, 0.0) * share / along).sum() for z in height]
+    np.testing.assert_allclose(result, expected, atol=2e-4 * sine)
+
+
+def test_half_of_all_directions_light_a_tilted_surface_by_a_mean_of_its_tilt():
+    """(1 + cosω)/2 for a hemisphere of uniform radiance."""
+    height = np.linspace(-1.0, 1.0, 21)
+    body = "vec4 evaluate() { return vec4(cone_cosine_factor(cone.x, 1.0)); }"
+    result = evaluate(INCLUDES, body, {"cone": height[:, None]}, defines=DEFINES)[:, 0]
+    np.testing.assert_allclose(result, 0.5 * (1.0 + height), atol=1e-4)
+
+
 @pytest.mark.parametrize("name", SPREAD)
 def test_spread_is_right_to_a_hundredth(name):
     """An approximation: measured, the mean error is 0.2 % to 0.9 %."""
     result, expected, _ = irradiances(SPREAD[name])
     assert (expected > 0.0).sum() > 3
     assert np.abs(result[:, 0] - expected).sum() <= 0.02 * expected.sum()
+
+
+def test_a_rough_diffuse_surface_reflects_a_light_as_its_brdf_says_of_the_centre():
+    item = light(LightKind.AREA, (0.5, 0.2, 2.0), (-0.3, 0.1, -1.0), size=(0.02, 0.02))
+    body = """
+    vec4 evaluate()
+    {
+        Surface surface = make_surface(color.rgb, 0.0, 0.0, 1.0, material.z, dot(normal.xyz, view.xyz));
+        Light light = fetch_light(0);
+        vec3 whole = analytic_diffuse(light, surface, place.xyz, normal.xyz, view.xyz);
+        LightSample point = sample_light(light, place.xyz, LightPoint(vec3(0), vec3(0), 0, 0));
+        vec3 sampled = point.weight * diffuse_brdf_cosine(surface, normal.xyz, view.xyz, point.direction);
+        return vec4(whole / sampled, 0);
+    }
+    """
+    inputs = {"place": [[0, 0, 0, 0]] * 3, "normal": [[0, 0, 1]] * 3, "view": [[0.6, 0.0, 0.8]] * 3}
+    inputs |= {"color": [[0.9, 0.5, 0.2, 1.0]] * 3, "material": [[0, 1, roughness] for roughness in (0.0, 0.4, 1.0)]}
+    ratio = evaluate(INCLUDES, body, inputs, defines=(*DEFINES, "DIFFUSE_ROUGHNESS"), lights=[item])
+    np.testing.assert_allclose(ratio[:, :3], 1.0, rtol=1e-3)
 
 
 MATERIALS = {"metal": ((0.9, 0.6, 0.2, 0.04), 1.0), "plastic": ((0.0, 0.0, 0.0, 0.04), 0.0)}
@@ -280,8 +322,8 @@ def test_no_place_or_light_gives_nan():
     generator = np.random.default_rng(2)
     inputs["color"] = generator.choice([0.0, 0.04, 1.0], (count, 4))
     inputs["material"] = generator.choice([0.0, 0.03, 0.5, 1.0], (count, 2))
-    for body in (IRRADIANCE, SPECULAR):
-        result = evaluate(INCLUDES, body, inputs, defines=DEFINES, lights=items)[:, :3]
+    for body, defines in ((IRRADIANCE, DEFINES), (SPECULAR, DEFINES), (SPECULAR, (*DEFINES, "PHONG"))):
+        result = evaluate(INCLUDES, body, inputs, defines=defines, lights=items)[:, :3]
         assert not np.isnan(result).any()
         assert (result >= 0.0).all()
         assert np.isfinite(result[np.abs(inputs["place"][:, 2]) > 1e-3]).all()

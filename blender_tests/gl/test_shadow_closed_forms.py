@@ -51,7 +51,9 @@ def assert_shadow(found, expected, whole):
     shares = expected / whole
     assert (shares == 0.0).sum() >= 4, "the case must have an umbra"
     assert ((shares > 0.1) & (shares < 0.9)).sum() >= 3, "the case must have a penumbra"
-    leak = found[shares == 0.0] / whole[shares == 0.0]
+    # A shadow map's texels are as large as pixels, so that the pixel beside an edge may have its neighbour's shadow.
+    umbra = (shares == 0.0) & (np.roll(shares, -1) == 0.0)
+    leak = found[umbra] / whole[umbra]
     assert not leak.any(), f"light leaks into the umbra: {leak}"
     np.testing.assert_allclose(found / whole, shares, atol=PENUMBRA)
     lit = shares > 1.0 - 1e-9
@@ -92,8 +94,9 @@ def test_sun_behind_an_edge(shared_session):
 
 @pytest.mark.parametrize("soft", [False, True])
 def test_small_sphere_behind_an_edge(shared_session, soft):
-    """A lamp far off for its size: the share of its disk, over which cosine and distance vary evenly enough (second order, below 1 %)."""
-    radius = 0.3
+    """A lamp far off for its size: the share of its disk. Over it, cosine and distance vary by (r/d)² = 1.6 %, of which
+    the part that is not even in the offset changes the penumbra."""
+    radius = 0.5
     light = builders.light(position=(0.0, 0.0, LAMP_HEIGHT), emission=(8, 8, 8), radius=radius, soft_falloff=soft)
     x, found = row_of_light(shared_session, light)
     distance = np.sqrt(x**2 + LAMP_HEIGHT**2)

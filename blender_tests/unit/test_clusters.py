@@ -42,7 +42,8 @@ def grid(cells):
 def visible_runs(clusters, planes):
     """Stretches of triangles in the clusters whose boxes reach into half spaces, object space."""
     visible = boxes_inside(clusters.boxes.astype(np.float64), planes)
-    return runs(visible, clusters.first, clusters.count)
+    found = runs(visible, np.zeros(len(visible), np.int64), clusters.first, clusters.count)
+    return [(first, count) for _, first, count in found]
 
 
 def covered(stretches, total):
@@ -104,9 +105,11 @@ def test_a_small_view_draws_a_small_part():
 
 def test_stretches_end_where_something_is_missing_between():
     first, count = np.array([0, 3, 6, 10, 12]), np.array([3, 3, 3, 2, 5])
-    assert runs(np.array([1, 1, 0, 0, 1], bool), first, count) == [(0, 6), (12, 5)]
-    assert runs(np.ones(5, bool), first, count) == [(0, 9), (10, 7)]
-    assert runs(np.zeros(5, bool), first, count) == []
+    one, two = np.zeros(5, np.int64), np.array([4, 4, 4, 7, 9])
+    assert runs(np.array([1, 1, 0, 0, 1], bool), one, first, count) == [(0, 0, 6), (0, 12, 5)]
+    assert runs(np.ones(5, bool), one, first, count) == [(0, 0, 9), (0, 10, 7)]
+    assert runs(np.ones(5, bool), two, first, count) == [(4, 0, 9), (7, 10, 2), (9, 12, 5)]
+    assert runs(np.zeros(5, bool), one, first, count) == []
 
 
 def test_placed_boxes_hold_the_placed_corners():

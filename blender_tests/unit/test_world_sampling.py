@@ -101,7 +101,7 @@ def test_black_map_has_no_weight():
     st.tuples(*[st.floats(0.0, 10.0)] * 3),
 )
 def test_weights_are_radiance_over_density(values, radiance):
-    """Whatever the map: unit directions, bounded weights, and exactly radiance over the density that integrates to 1."""
+    """Whatever the map: unit directions, bounded weights, and exactly radiance over the density."""
     environment = world(gray(values), radiance)
     sampler = WorldSampler(environment)
     directions, weights = sampler.directions(lattice(256))

@@ -5,11 +5,16 @@
 #include "common/lights.glsl"
 #include "common/ltc.glsl"
 
-// Angular size below which a light's directions count as one: the error of that is of second order.
+// Sine below which a cone counts as one direction.
+const float SMALLEST_CONE = 1e-6;
+// Angular size below which an area light counts as one direction: the error of that is of second order.
 const float SMALLEST_ANGLE = 0.01;
 // Angular size over GGX's α, half the width of its lobe: up to the first, a highlight is that of the light's centre, and
 // from the second on the whole light's.
 const vec2 POINT_TO_SOLID = vec2(0.03, 0.1);
+
+// n·l of a light's centre below which a rough diffuse surface is taken for a Lambertian one.
+const float LOWEST_CENTER = 1e-3;
 
 /** A cone of directions in which radiance is uniform. */
 struct LightCone
@@ -48,45 +53,37 @@ LightCone light_cone(Light light, vec3 position)
                      light.emission * (spot_factor(light, -direction) / outer));
 }
 
+/** (1 + x²) atan(z) - x² z with z = y/x, x and y not negative, of which small z leave no digits. */
+float segment_term(float x, float y)
+{
+    if (y > 0.4 * x)
+        return (1.0 + x * x) * atan(y, x) - x * y;
+    float z = y / x;
+    float square = z * z;
+    float defect = 1.0 / 3.0 - square * (1.0 / 5.0 - square * (1.0 / 7.0 - square / 9.0));
+    return z - (1.0 + x * x) * z * square * defect; // z - atan(z) = z³ defect
+}
+
 /**
  * Irradiance of a surface by a cone of uniform radiance, over that of one that faces it.
  *
  * Exact with the part below the horizon cut off: configuration factor of a sphere to a tilted planar element (Naraghi
- * and Chung 1982), a sphere and a cone being the same directions. Narrow cones as flat disks. `cosine`: of the angle
- * between normal and axis, `sine`: of the half angle.
+ * and Chung 1982), a sphere and a cone being the same directions, its terms arranged so that narrow cones keep their
+ * digits. `cosine`: of the angle between normal and axis, `sine`: of the half angle.
  */
 float cone_cosine_factor(float cosine, float sine)
 {
-    if (cosine >= sine)
-        return cosine;
+    if (cosine >= sine || sine < SMALLEST_CONE)
+        return max(cosine, 0.0);
     if (cosine <= -sine)
         return 0.0;
-    if (sine < SMALLEST_ANGLE) {
-        float t = cosine / sine;
-        float chord = sqrt(1.0 - t * t);
-        return sine / PI * (t * (0.5 * PI + asin(t) + t * chord) + 2.0 / 3.0 * chord * chord * chord);
-    }
-    float tangent_sine = sqrt(1.0 - cosine * cosine); // of the angle between normal and axis
+    float tilt_sine = sqrt(1.0 - cosine * cosine);
     float x = sqrt(1.0 - sine * sine) / sine;
-    float y = clamp(-x * cosine / tangent_sine, -1.0, 1.0);
-    float root = sqrt(1.0 - y * y);
-    return (cosine * acos(y) - x * tangent_sine * root + atan(tangent_sine * root, x) / (sine * sine)) / PI;
+    float y = clamp(-x * cosine / tilt_sine, -1.0, 1.0);
+    return (cosine * acos(y) + segment_term(x, tilt_sine * sqrt(1.0 - y * y))) / PI;
 }
 
 #ifdef AREA_LIGHTS
-/** Radiance in a direction with this cosine to the light's axis, over the light's emission. */
-float spread_factor(Light light, float cosine)
-{
-    if (light.spread_norm <= 0.0)
-        return 1.0;
-    return max(light.spread_slope - sqrt(max(1.0 - cosine * cosine, 0.0)) / cosine, 0.0) / light.spread_norm;
-}
-
-float light_area(Light light)
-{
-    return length(light.half_x) * length(light.half_y) * (light.ellipse ? PI : 4.0);
-}
-
 /** Whether the light has a front that faces a point, `center` being the light's as seen from there. */
 bool shines_on(Light light, vec3 center)
 {
@@ -181,6 +178,23 @@ vec3 analytic_irradiance(Light light, vec3 position, vec3 normal)
     return cone.irradiance * cone_cosine_factor(dot(normal, cone.direction), cone.sine);
 }
 
+/**
+ * Radiance that the surface reflects diffusely of such a light, unshadowed: exact for a Lambertian surface; a rough one
+ * reflects as it does what comes from the light's centre.
+ */
+vec3 analytic_diffuse(Light light, Surface surface, vec3 position, vec3 normal, vec3 view)
+{
+    vec3 irradiance = analytic_irradiance(light, position, normal);
+#ifdef DIFFUSE_ROUGHNESS
+    vec3 direction = light.kind == LIGHT_SUN ? -light.axis : light.position - position;
+    float squared = dot(direction, direction);
+    float n_dot_l = squared > 0.0 ? dot(normal, direction) * inversesqrt(squared) : 0.0;
+    if (n_dot_l > LOWEST_CENTER)
+        return irradiance * diffuse_brdf_cosine(surface, normal, view, direction * inversesqrt(squared)) / n_dot_l;
+#endif
+    return irradiance * surface.diffuse_albedo / PI;
+}
+
 #ifdef SPECULAR
 /** Columns: the view's projection onto the surface, across it, and the normal. */
 mat3 view_frame(vec3 normal, vec3 view)
@@ -266,6 +280,8 @@ vec3 area_specular(Light light, Surface surface, vec3 center, vec3 normal, vec3 
  */
 vec3 analytic_specular(Light light, Surface surface, vec3 position, vec3 normal, vec3 view)
 {
+    if (surface.specular_f0 == vec3(0.0))
+        return vec3(0.0);
 #ifdef AREA_LIGHTS
     if (light.kind == LIGHT_AREA)
         return area_specular(light, surface, light.position - position, normal, view);

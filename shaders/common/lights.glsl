@@ -4,7 +4,7 @@
 // 0 the point: of area lights −1…1 along the half axes; of points, spots and suns in the unit ball, world axes; of
 //   emissive surfaces the position · how many shadow maps, −1 for the faces of a cube
 // 1 normal of an emissive surface there; of lamps the point's position · its first shadow map
-// 2 square of how far the light reaches in this sample, and in every sample, m²
+// 2 square of how far the light reaches in this sample, and in every sample, m² · 1 where its point is always the same
 
 #include "common/constants.glsl"
 
@@ -44,6 +44,7 @@ struct LightPoint
     vec3 normal;            // of an emissive surface; of a lamp its sampled position
     int shadow_count;
     int shadow_first;
+    bool is_fixed;          // whether every sample has the same point
 };
 
 struct LightSample
@@ -63,7 +64,8 @@ LightPoint fetch_light_point(int index)
     ivec2 first = light_texel(index, TEXELS_PER_SAMPLE);
     vec4 point = texelFetch(light_samples, first, 0);
     vec4 normal = texelFetch(light_samples, first + ivec2(1, 0), 0);
-    return LightPoint(point.xyz, normal.xyz, int(point.w), int(normal.w));
+    vec4 reach = texelFetch(light_samples, first + ivec2(2, 0), 0);
+    return LightPoint(point.xyz, normal.xyz, int(point.w), int(normal.w), reach.z > 0.0);
 }
 
 #ifdef LINKING
@@ -130,20 +132,33 @@ LightSample sample_sun(Light light, vec3 offset)
                        light.emission * cone_flattening(sine * sine));
 }
 
+/** Area of an area light, m². */
+float light_area(Light light)
+{
+    return length(light.half_x) * length(light.half_y) * (light.ellipse ? PI : 4.0);
+}
+
+/**
+ * Radiance of an area light in a direction with this cosine > 0 to its axis, over its emission: it falls with the slope
+ * from the axis, normalised to the flux of a Lambertian emitter.
+ */
+float spread_factor(Light light, float cosine)
+{
+    if (light.spread_norm <= 0.0)
+        return 1.0;
+    return max(light.spread_slope - sqrt(max(1.0 - cosine * cosine, 0.0)) / cosine, 0.0) / light.spread_norm;
+}
+
 LightSample sample_area(Light light, vec3 position, vec3 offset)
 {
-    float area = length(light.half_x) * length(light.half_y) * (light.ellipse ? PI : 4.0);
     vec3 to_light = light.position + offset.x * light.half_x + offset.y * light.half_y - position;
     float distance_squared = dot(to_light, to_light);
     vec3 direction = to_light * inversesqrt(distance_squared);
     float cosine = -dot(direction, light.axis);
     if (!(distance_squared > 0.0 && cosine > 0.0))
         return LightSample(-light.axis, vec3(0.0));
-    // Spread: radiance falls with the slope from the axis, normalised to the flux of a Lambertian emitter.
-    float spread = 1.0;
-    if (light.spread_norm > 0.0)
-        spread = max(light.spread_slope - sqrt(max(1.0 - cosine * cosine, 0.0)) / cosine, 0.0) / light.spread_norm;
-    return LightSample(direction, light.emission * (spread * area * cosine / distance_squared));
+    float facing = spread_factor(light, cosine) * light_area(light) * cosine / distance_squared;
+    return LightSample(direction, light.emission * facing);
 }
 
 /** An emissive surface, sampled at a position (camera-relative) with unit normal, uniformly over its area. */

@@ -148,8 +148,8 @@ float point_visibility(LightPoint point, vec3 origin, Receiver receiver, float n
     vec3 place;
     if (!find_map(point, origin, receiver.position, map, place))
         return 1.0;
-    // Each sample rounds to the texel grid elsewhere: edges of shadows become smooth, even of lights without size.
-    ivec2 texel = texel_of(map, place.xy + shadow_jitter);
+    // Samples of a light that always has the same map round to its texels elsewhere each: its edges become smooth.
+    ivec2 texel = texel_of(map, place.xy + (point.is_fixed ? shadow_jitter : vec2(0.0)));
     float distance = map.orthographic ? 1.0 : length(receiver.position - origin);
     vec2 gradient = receiver_gradient(map, receiver.normal, n_dot_l, distance);
     return hides(map, texel, place, gradient, receiver_tolerance(map, receiver, place.z, n_dot_l)) ? 0.0 : 1.0;

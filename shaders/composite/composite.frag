@@ -8,10 +8,7 @@
 #include "common/shared_exponent.glsl"
 #include "generated/CompositeUniforms.glsl"
 #include "generated/outputs.glsl"
-
-#ifdef ENVIRONMENT
 #include "common/environment.glsl"
-#endif
 
 uniform sampler2DArray view_depth_layers;
 uniform sampler2DArray normal_layers;
@@ -82,11 +79,7 @@ vec3 shown_color(ivec3 texel, float view_depth)
 /** What the camera sees of the world through a pixel. */
 vec3 background_radiance(vec2 pixel)
 {
-#ifdef ENVIRONMENT
-    return environment_radiance(-view_direction(pixel)) * background.rgb;
-#else
-    return background.rgb;
-#endif
+    return world_seen != 0 ? environment_radiance(-view_direction(pixel)) : vec3(0.0);
 }
 
 #if defined(FILM_DIFFUSE_COLOR) || defined(FILM_GLOSSY_COLOR)
@@ -107,7 +100,7 @@ void main()
     ivec3 shown = ivec3(pixel, shown_layer);
     float view_depth = texelFetch(view_depth_layers, shown, 0).r;
     if (isinf(view_depth))
-        out_combined = background.a > 0.0 ? vec4(background_radiance(pixel), background.a) : vec4(0.0);
+        out_combined = opaque != 0 ? vec4(background_radiance(pixel), 1.0) : vec4(0.0);
     else
         out_combined = vec4(shown_color(shown, view_depth), 1.0);
 

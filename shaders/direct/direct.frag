@@ -23,7 +23,7 @@
 #include "common/light_tiles.glsl"
 #endif
 #endif
-#ifdef ENVIRONMENT
+#ifdef WORLD
 #include "common/environment.glsl"
 #endif
 
@@ -72,6 +72,15 @@ LightPoint scattered(Light light, LightPoint point, vec2 random)
 {
     LightPoint moved = point;
     vec2 offset = highlight_jitter * (2.0 * random - 1.0);
+#ifdef MESH_LIGHTS
+    if (light.kind == LIGHT_MESH) {
+        // On the plane through the point, as if the surface were a square of the same area.
+        vec3 tangent, bitangent;
+        orthonormal_basis(point.normal, tangent, bitangent);
+        moved.offset += 0.5 * sqrt(light.radius) * (offset.x * tangent + offset.y * bitangent);
+        return moved;
+    }
+#endif
     if (light.kind == LIGHT_AREA && !light.ellipse) {
         vec2 place = point.offset.xy + offset;
         moved.offset.xy = clamp(place, -2.0 - place, 2.0 - place); // folded back at the edges
@@ -137,13 +146,10 @@ Reflected lit_by_point(int index, Light light, LightPoint point, Shading shading
         && !(light.kind == LIGHT_WORLD && shading.surface.alpha < smallest_world_alpha)) {
         // Highlights take another point near the sampled one in every pixel: a shared one would show as a dot.
         LightSample reflected = sample_light(light, shading.position, scattered(light, point, shading.random));
-        bool same = light.kind == LIGHT_MESH || light.kind == LIGHT_WORLD;
-        vec3 direction = same ? incident.direction : reflected.direction;
-        vec3 arriving = same || max(max(incident.weight.r, incident.weight.g), incident.weight.b) == 0.0
-                            ? weight
-                            : weight * (reflected.weight / max(incident.weight, vec3(1e-37)));
-        result.glossy = specular_brdf_cosine(shading.surface, shading.normal, shading.view, direction) * arriving
-                        * light.specular_factor;
+        // Whatever is in between the sampled point is in between this one as well.
+        vec3 arriving = weight * (reflected.weight / max(incident.weight, vec3(1e-37)));
+        result.glossy = specular_brdf_cosine(shading.surface, shading.normal, shading.view, reflected.direction)
+                        * arriving * light.specular_factor;
     }
 #endif
     return result;
@@ -196,18 +202,10 @@ Reflected lit(Shading shading)
 /** What the world causes where nothing is in between. */
 Reflected lit_by_world(Shading shading)
 {
-    vec3 mirrored = reflect(-shading.view, shading.normal);
     Reflected result = Reflected(vec3(0.0), vec3(0.0));
-#ifdef ENVIRONMENT
-    result.glossy = environment_specular(mirrored, shading.surface.alpha);
+    result.glossy = environment_specular(reflect(-shading.view, shading.normal), shading.surface.alpha);
 #ifdef PREVIEW
     result.diffuse = environment_irradiance(shading.normal) / PI;
-#endif
-#else
-    result.glossy = world_radiance.rgb;
-#ifdef PREVIEW
-    result.diffuse = world_radiance.rgb;
-#endif
 #endif
     result.diffuse *= shading.surface.diffuse_albedo * world_factors.x;
     result.glossy *= shading.surface.specular_albedo * world_factors.y;

@@ -12,6 +12,7 @@ from ...scene.correspondence import Correspondence
 from ...scene.drift import pixel_drift
 from ..device import Device
 from ..draws import DrawLists
+from ..environment import EnvironmentTextures
 from ..film import Film
 from ..geometry import GeometryStore
 from ..images import ImageStore
@@ -55,6 +56,7 @@ class Frame:
     film: Film
     oracle: OracleState
     lighting: Lighting
+    environment: EnvironmentTextures
     correspondence: Callable[[Scene], Correspondence]
     scene: Scene
     settings: RenderSettings

@@ -6,13 +6,16 @@ from itertools import combinations
 
 from ...scene import Channel, DebugView
 from ..device import Device
+from ..environment import ENVIRONMENT_DEFINE, ENVIRONMENT_UNIFORMS, MAP_SAMPLER, environment_uniforms
 from ..plan import SUM_CHANNELS, PlannedPass
 from ..programs import ProgramSpec
 from ..uniforms import UniformBlock
 from .base import Frame, subsets
 from .fullscreen import FullscreenDraw, fullscreen_program
 
-COMPOSITE_UNIFORMS = UniformBlock("CompositeUniforms", (("background", "vec4"), ("shown_layer", "int")))
+COMPOSITE_UNIFORMS = UniformBlock(
+    "CompositeUniforms", (*ENVIRONMENT_UNIFORMS, ("world_seen", "int"), ("opaque", "int"), ("shown_layer", "int"))
+)
 
 
 class CompositePass:
@@ -47,10 +50,13 @@ class CompositePass:
         self._fullscreen.bind(frame, spec, planned)
         debug = frame.settings.debug_view is not DebugView.NONE
         world = frame.scene.world
-        opaque = not debug and not frame.settings.transparent_film
+        if ENVIRONMENT_DEFINE in spec.defines and world.environment is not None:
+            frame.environment.bind(world.environment, spec)
         self._fullscreen.draw(
             spec,
-            background=(*(world.radiance if world.seen_by_camera else (0.0, 0.0, 0.0)), float(opaque)),
+            **environment_uniforms(world),
+            world_seen=int(world.seen_by_camera),
+            opaque=int(not debug and not frame.settings.transparent_film),
             shown_layer=min(frame.settings.debug_layer, frame.plan.layers - 1) if debug else 0,
         )
 
@@ -65,5 +71,9 @@ def _program(defines: frozenset[str]) -> ProgramSpec:
         f"layout(location = {index}) out vec4 out_{channel.value.lower()};\n" for index, channel in enumerate(sums)
     )
     return fullscreen_program(
-        "composite/composite.frag", COMPOSITE_UNIFORMS, defines, generated=(("outputs", outputs),)
+        "composite/composite.frag",
+        COMPOSITE_UNIFORMS,
+        defines,
+        samplers=(MAP_SAMPLER,),
+        generated=(("outputs", outputs),),
     )

@@ -9,6 +9,7 @@ import moderngl
 
 from ..device import Device
 from ..direct_needs import DIRECT_DEFINES, direct_program_defines
+from ..environment import ENVIRONMENT_DEFINE, ENVIRONMENT_SAMPLERS, ENVIRONMENT_UNIFORMS, environment_uniforms
 from ..layout import LIGHTS_PER_PAGE, TILE_SIZE, light_pages
 from ..light_table import LIGHTS_PER_ROW, TEXELS_PER_LIGHT, TEXELS_PER_SAMPLE
 from ..plan import PlannedPass
@@ -22,7 +23,7 @@ from .fullscreen import FullscreenDraw, fullscreen_program
 DIRECT_UNIFORMS = UniformBlock(
     "DirectUniforms",
     (
-        ("world_radiance", "vec4"),
+        *ENVIRONMENT_UNIFORMS,
         ("world_factors", "vec2"),  # on what it causes by diffuse and by glossy reflection
         ("shadow_jitter", "vec2"),  # texels from where a sample looks a shadow up
         ("pixel_shift", "vec2"),  # of every pixel's random numbers
@@ -87,12 +88,15 @@ class DirectPass:
                 frame.shadows.atlas.use(spec.samplers.index("shadow_atlas"))
             frame.shadows.table.use(spec.samplers.index("shadow_table"))
 
+        if ENVIRONMENT_DEFINE in spec.defines and frame.scene.world.environment is not None:
+            frame.environment.bind(frame.scene.world.environment, spec)
+
     def _uniforms(self, frame: Frame) -> dict[str, object]:
         world, lighting, settings = frame.scene.world, frame.lighting, frame.settings
         shift = pixel_shift(frame.sample.index)
         directions = max(lighting.plan.world_directions * settings.samples, 1)
         return {
-            "world_radiance": (*world.radiance, 0.0),
+            **environment_uniforms(world),
             "world_factors": (float(world.seen_by_diffuse), float(world.seen_by_glossy)),
             "shadow_jitter": (shift[0] - 0.5, shift[1] - 0.5),
             "pixel_shift": shift,
@@ -113,5 +117,5 @@ def _program(defines: frozenset[str]) -> ProgramSpec:
         f"TILE_SIZE {TILE_SIZE}",
         f"LIGHTS_PER_PAGE {LIGHTS_PER_PAGE}",
     }
-    samplers = ("light_table", "light_samples", "shadow_atlas", "shadow_table")
+    samplers = ("light_table", "light_samples", "shadow_atlas", "shadow_table", *ENVIRONMENT_SAMPLERS)
     return fullscreen_program("direct/direct.frag", DIRECT_UNIFORMS, defines | sizes, samplers=samplers)

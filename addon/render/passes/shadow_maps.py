@@ -9,9 +9,11 @@ import numpy as np
 
 from ...scene.arrays import Int64Array
 from ..atlas import Slot
+from ..caster_clusters import CasterClusters
 from ..casters import CasterList, Casters
 from ..device import Device
 from ..draws import MATERIAL_UNIFORMS, SceneDraws
+from ..frustum import frustum_planes
 from ..geometry import OtherTimes, split_float64
 from ..layout import DEPTH_TILES_TARGET, TILE_SIZE
 from ..light_table import as_texels
@@ -68,9 +70,10 @@ class ShadowMapsPass:
         self._store = ShadowStore(device)
         self._uniforms = UniformBuffer(device, SHADOW_MAPS_UNIFORMS)
         self._casters = CasterList()
+        self._clusters = CasterClusters()
         self._receivers: Receivers | None = None
         self._sources: tuple[ShadowSource, ...] = ()
-        self._views: dict[int, tuple[int, tuple[_View | None, ...]]] = {}
+        self._views: dict[int, dict[tuple[int, float], tuple[_View | None, ...]]] = {}
         self._largest = 0
         self._table: moderngl.Texture | None = None
 
@@ -94,7 +97,7 @@ class ShadowMapsPass:
         if self._receivers is None:
             tiles = read_target(frame.pool, DEPTH_TILES_TARGET)
             self._receivers = visible_receivers(tiles, TILE_SIZE, frame.view, frame.pool.size, _JITTER_MARGIN)
-            self._sources = shadow_sources(frame.lighting.plan, self._receivers)
+            self._sources = shadow_sources(frame.lighting.plan)
             self._views = {}
             self._largest = frame.settings.shadow_map_size
         views = self._current_views(frame, casters, self._receivers)
@@ -117,9 +120,8 @@ class ShadowMapsPass:
         while True:
             for source in self._sources:
                 self._update(frame, source, casters, receivers)
-            views = {
-                source.index: self._views[source.index][1] for source in self._sources if self._is_lit(frame, source)
-            }
+            lit = [source.index for source in self._sources if self._is_lit(frame, source)]
+            views = {index: self._views[index][frame.lighting.state(index)] for index in lit}
             texels = sum(view.shadow_map.size**2 for maps in views.values() for view in maps if view is not None)
             if texels <= self._store.capacity or self._largest <= SMALLEST_SIZE:
                 return views
@@ -131,13 +133,16 @@ class ShadowMapsPass:
         return source.index < frame.lighting.count
 
     def _update(self, frame: Frame, source: ShadowSource, casters: Casters, receivers: Receivers) -> None:
-        """Look from a source's point of this sample, unless it is the one of before."""
-        number = frame.lighting.number(source.index)
-        held = self._views.get(source.index)
-        if not self._is_lit(frame, source) or (held is not None and held[0] == number):
+        """Look from a source's point of this sample as far as it reaches, unless that is known from before."""
+        number, reach = state = frame.lighting.state(source.index)
+        held = self._views.setdefault(source.index, {})
+        if not self._is_lit(frame, source) or state in held:
             return
-        maps = source.maps(frame.lighting.points[source.index], receivers, casters.bounds, self._largest)
-        self._views[source.index] = number, tuple(_view(item, casters, source.blocker_groups) for item in maps)
+        if any(other != number for other, _ in held):
+            held.clear()
+        point = frame.lighting.points[source.index]
+        maps = source.maps(point, receivers, casters.bounds, self._largest, reach)
+        held[state] = tuple(_view(item, casters, source.blocker_groups) for item in maps)
 
     def _draw_fresh(
         self,
@@ -154,6 +159,7 @@ class ShadowMapsPass:
         context = self._device.context
         context.enable_only(moderngl.DEPTH_TEST)
         context.depth_func = ">"
+        self._clusters.begin(casters.draws, draws.scene.meshes)
         for key, view in missing.items():
             self._store.target(slots[key]).use()
             self._device.raw.clear_color_uint(0, 0)
@@ -164,16 +170,17 @@ class ShadowMapsPass:
     def _draw(self, frame: Frame, draws: SceneDraws, casters: Casters, view: _View) -> None:
         self._bind(view.shadow_map, frame.settings.alpha_threshold)
         depth = frozenset[str](() if self._device.zero_to_one_depth else {FRAGMENT_DEPTH})
-        for index in view.seen.tolist():
-            draw = casters.draws[index]
+        for part in self._clusters.seen(view.seen, frustum_planes(view.shadow_map.camera)):
+            draw = casters.draws[part.caster]
             program = self._device.programs.get(_program(depth | draw.surface & {_PIERCED}))
             if draw.texture is not None and _PIERCED in draw.surface:
                 frame.images.use(draw.texture, 0)
                 draws.bind_material(draw, _MATERIAL_BINDING)
-            vertex_array = frame.geometry.vertex_array(frame.scene, draw.batch, program, OtherTimes(), 1)
-            vertex_array.render(
-                moderngl.TRIANGLES, vertices=draw.index_count, first=draw.first_index, instances=draw.batch.count
+            vertex_array = frame.geometry.vertex_array(
+                frame.scene, draw.batch, program, OtherTimes(), 1, part.triangles
             )
+            for first, count in part.runs:
+                vertex_array.render(moderngl.TRIANGLES, vertices=count, first=first, instances=draw.batch.count)
 
     def _bind(self, shadow_map: ShadowMap, alpha_threshold: float) -> None:
         camera = shadow_map.camera
