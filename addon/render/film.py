@@ -17,6 +17,11 @@ CHANNEL_COMPONENTS = {
     Channel.POSITION: 3,
     Channel.DIFFUSE_COLOR: 3,
     Channel.OBJECT_INDEX: 1,
+    Channel.GLOSSY_COLOR: 3,
+    Channel.DIFFUSE_DIRECT: 3,
+    Channel.GLOSSY_DIRECT: 3,
+    Channel.EMISSION: 3,
+    Channel.ENVIRONMENT: 3,
 }
 
 

@@ -3,8 +3,7 @@
 
 Up to its full reach R0 a light is always there; farther out, where it is fainter than a threshold, with probability
 p(d) = (R0/d)² and 1/p times as bright: Russian roulette (Arvo and Kirk 1990, "Particle Transport and Image Synthesis"),
-as Cycles' light threshold. Each sample of the film draws one number ξ per light for all pixels: it is there where
-d < R0/√ξ.
+as Cycles' light threshold. A number ξ is drawn for a light and all pixels: it is there where d < R0/√ξ.
 """
 
 from collections.abc import Sequence
@@ -24,8 +23,8 @@ MANY_LIGHTS = 16
 _RANGE = 2**32
 _LIGHT_STEP = 0x9E3779B9
 """2³² times the golden ratio's fraction, which spreads similar keys (Knuth, The Art of Computer Programming, 6.4)."""
-_SAMPLE_STEP = 0x6A09E667
-"""2³² times the fraction of √2, which no other sampling pattern steps by: samples share out those of one light."""
+_DRAW_STEP = 0x6A09E667
+"""2³² times the fraction of √2, which no other sampling pattern steps by: draws share out the numbers of one light."""
 
 
 def peak_intensity(light: Light) -> float:
@@ -60,9 +59,12 @@ def full_reach(intensities: Float64Array, extents: Float64Array, threshold: floa
     return np.where(intensities > 0.0, extents + np.sqrt(intensities / (pi * threshold)), 0.0)
 
 
-def roulette(keys: Sequence[str], sample: int, seed: int) -> Float64Array:
-    """(L,) ξ in (0, 1] of the lights with these keys in a sample: even over the samples of each, whatever others do."""
-    return _share(_light_steps(keys, seed) + _sample_steps(np.array([sample])))
+def roulette(keys: Sequence[str], draws: Int64Array, seed: int) -> Float64Array:
+    """(L,) ξ in (0, 1] of the lights with these keys, each for the draw with its number in `draws` (L,).
+
+    Even over successive draws of each light, whatever others do.
+    """
+    return _share(_light_steps(keys, seed) + _draw_steps(draws))
 
 
 def sampled_reach(full: Float64Array, xi: Float64Array) -> Float64Array:
@@ -78,9 +80,9 @@ def rounded_reach(full: Float64Array, reach: Float64Array) -> Float64Array:
     return full * 2.0 ** np.nan_to_num(steps)
 
 
-def farthest_reach(full: Float64Array, keys: Sequence[str], samples: int, seed: int) -> Float64Array:
-    """(L,) m: how far each light reaches at most in the first `samples` samples."""
-    lights, steps = _light_steps(keys, seed), np.sort(_sample_steps(np.arange(samples)))
+def farthest_reach(full: Float64Array, keys: Sequence[str], draws: int, seed: int) -> Float64Array:
+    """(L,) m: how far each light reaches at most in its first `draws` draws."""
+    lights, steps = _light_steps(keys, seed), np.sort(_draw_steps(np.arange(draws)))
     # The smallest sum modulo 2³² is that of the first step that wraps around, or of none.
     wrapping = np.searchsorted(steps, _RANGE - lights)
     smallest = lights + np.append(steps, 0)[wrapping]
@@ -130,5 +132,5 @@ def _light_steps(keys: Sequence[str], seed: int) -> Int64Array:
     return np.array([(start + _LIGHT_STEP * crc32(key.encode())) % _RANGE for key in keys], np.int64)
 
 
-def _sample_steps(samples: Int64Array) -> Int64Array:
-    return _SAMPLE_STEP * samples.astype(np.int64) % _RANGE
+def _draw_steps(draws: Int64Array) -> Int64Array:
+    return _DRAW_STEP * draws % _RANGE

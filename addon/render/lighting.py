@@ -143,7 +143,9 @@ class Lighting:
         if self.plan.many:
             full = np.array(self.plan.reach)
             keys = [light.key for light in self.plan.lights]
-            reach = sampled_reach(full, roulette(keys, sample, self._settings.seed))
+            # A light whose point changes is drawn anew with it, so that its shadows are, too, as far as it reaches.
+            draws = np.where(self._extended[:lamps], self.numbers[:lamps], sample)
+            reach = sampled_reach(full, roulette(keys, draws, self._settings.seed))
             self.samples[:lamps, 2, 0], self.samples[:lamps, 2, 1] = reach**2, full**2
             self._reach[:lamps] = rounded_reach(full, reach)
 

@@ -108,7 +108,7 @@ class LocalReceivers:
     ) -> ShadowMap:
         """What those of them that are `seen` (P,) need of a map from a point of the light along an axis.
 
-        `half`: half width, at distance 1, of all that the map may show; where they fill little of it, it shows them only.
+        `half`: half width, at distance 1, of all that it may show; where they fill little of that, it shows no more.
         """
         frame = look_along(axis)
         middle, half = self._window(self._corners[seen] - (point - self._center), frame, half)

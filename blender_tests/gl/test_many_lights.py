@@ -51,8 +51,9 @@ def expected(plan, height, samples, seed=0):
     lights, full = plan.lights.lights, np.array(plan.lights.reach)
     radiance, squared = by_light(lights, height)
     total, unsure = np.zeros((SIZE, SIZE, 3)), np.zeros((SIZE, SIZE), bool)
+    keys = [light.key for light in lights]
     for sample in samples:
-        reach = sampled_reach(full, roulette([light.key for light in lights], sample, seed))[:, None, None]
+        reach = sampled_reach(full, roulette(keys, np.full(len(keys), sample), seed))[:, None, None]
         weight = (squared < reach**2) * np.maximum(squared / full[:, None, None] ** 2, 1.0)
         total += (weight[..., None] * radiance).sum(axis=0)
         unsure |= (np.abs(squared / reach**2 - 1.0) < 1e-5).any(axis=0)

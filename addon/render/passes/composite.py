@@ -14,7 +14,13 @@ from .base import Frame, subsets
 from .fullscreen import FullscreenDraw, fullscreen_program
 
 COMPOSITE_UNIFORMS = UniformBlock(
-    "CompositeUniforms", (*ENVIRONMENT_UNIFORMS, ("world_seen", "int"), ("opaque", "int"), ("shown_layer", "int"))
+    "CompositeUniforms",
+    (
+        *ENVIRONMENT_UNIFORMS,
+        ("world_seen", "int"),  # whether the camera sees the world
+        ("opaque", "int"),  # whether there is a background
+        ("shown_layer", "int"),
+    ),
 )
 
 
