@@ -92,8 +92,11 @@ class Lighting:
 
     @property
     def point_spacing(self) -> float:
-        """About half the distance between the points that the film's samples use of a light whose half size is 1."""
-        return self._point_count**-0.5
+        """About half the distance between the points that the film's samples use of a light whose half size is 1.
+
+        0 in a preview, which has only one.
+        """
+        return 0.0 if self.preview else self._point_count**-0.5
 
     def state(self, index: int) -> tuple[int, float]:
         """Which of its points a light uses, and how far (m) it reaches at most: what its shadows depend on.

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf
 
-from ..scene import Camera, Channel, DebugView, RenderSettings, Scene, Variant
+from ..scene import Camera, Channel, DebugView, RenderSettings, Scene, ShadingModel, Variant
 from .layout import CHANNELS, EXIT_CHANNELS, GBufferChannel, TargetSpec
 from .lighting_passes import SPLIT_TARGETS, plan_lighting_passes
 from .lighting_plan import LightPlan, plan_lights
@@ -265,6 +265,7 @@ def _plan_composite(scene: Scene, settings: RenderSettings, direct: PlannedPass 
         defines |= {"SPECULAR"} if any(material.is_glossy for material in materials) else set[str]()
         rough = any(material.diffuse_roughness > 0.0 for material in materials)
         defines |= {"DIFFUSE_ROUGHNESS"} if rough else set[str]()
+        defines |= {"PHONG"} if settings.shading_model is ShadingModel.PHONG else set[str]()
     defines |= {"ENVIRONMENT"} if scene.world.environment is not None else set[str]()
     defines |= {"SPLIT"} if direct and settings.channels & SPLIT_TARGETS.keys() else set[str]()
     reads = {"view_depth"}.union(*(_FILM_CHANNELS[channel] for channel in settings.channels & MEAN_CHANNELS))

@@ -109,10 +109,12 @@ class ShadowStore:
     def _place(self, wanted: dict[Hashable, int]) -> tuple[dict[Hashable, Slot], set[Hashable]] | None:
         slots: dict[Hashable, Slot] = {}
         fresh: set[Hashable] = set()
+        idle = [key for key in self._entries if key not in wanted]
+        idle.sort(key=lambda key: self._eviction_rank(self._entries[key]), reverse=True)
         for key, size in sorted(wanted.items(), key=lambda item: -item[1]):  # large ones first: squares pack tightly
             entry = self._entries.get(key)
             if entry is None:
-                slot = self._allocate(size, wanted)
+                slot = self._allocate(size, idle)
                 if slot is None:
                     for lost in fresh:
                         self._drop(lost)
@@ -124,19 +126,17 @@ class ShadowStore:
             slots[key] = entry.slot
         return slots, fresh
 
-    def _allocate(self, size: int, wanted: dict[Hashable, int]) -> Slot | None:
+    def _allocate(self, size: int, idle: list[Hashable]) -> Slot | None:
+        """A slot, where one is free or gets free by dropping the last of what is `idle`, as much as need be."""
         slot = self._layout.allocate(size)
-        idle = [key for key in self._entries if key not in wanted]
-        outdated = any(self._entries[key].view < self._view - 1 for key in idle)
+        outdated = bool(idle) and self._entries[idle[-1]].view < self._view - 1
         may_grow = self._layout.pages < self._limit
-        if slot is not None or (may_grow and self._comes_round and not outdated):
+        if may_grow and self._comes_round and not outdated:
             return slot
-        for key in sorted(idle, key=lambda key: self._eviction_rank(self._entries[key])):
-            self._drop(key)
+        while slot is None and idle:
+            self._drop(idle.pop())
             slot = self._layout.allocate(size)
-            if slot is not None:
-                return slot
-        return None
+        return slot
 
     def _eviction_rank(self, entry: _Entry) -> tuple[int, int]:
         return (0, entry.used) if entry.view < self._view else (1, -entry.used)

@@ -18,7 +18,7 @@ def constant(tree, background):
 
 
 def gradient(tree, background):
-    texture = add(tree, "TexGradient", gradient_type="EASING")
+    texture = add(tree, "TexGradient", gradient_type="RADIAL")
     tree.links.new(texture.outputs[0], background.inputs["Color"])
 
 

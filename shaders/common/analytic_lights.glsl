@@ -120,20 +120,20 @@ float covered_cosine(Polygon polygon, vec3 normal)
 }
 
 /**
- * Irradiance over π by the part of a light of emission 1 that its spread lets shine here.
+ * What of a light its spread lets shine here: the rectangle around it, and the mean of the spread factor over that.
  *
- * Approximate: the rectangle around the part within the spread, exactly, times the mean of the spread factor over it by
- * 8x8 points; an ellipse's rim is blurred over the distance between two of them.
+ * Approximate: the mean is that of 8x8 points, and an ellipse's rim is blurred over the distance between two of them.
  */
-float covered_by_spread(Light light, vec3 center, vec3 normal)
+float spread_part(Light light, vec3 center, vec3 normal, out Polygon part)
 {
     const int POINTS = 8;
     vec2 half_size = vec2(length(light.half_x), length(light.half_y));
     vec2 foot = -vec2(dot(center, light.half_x), dot(center, light.half_y)) / (half_size * half_size);
     vec2 reach = -dot(center, light.axis) * light.spread_slope / half_size;
-    vec2 low = max(foot - reach, -1.0), high = min(foot + reach, 1.0);
-    if (any(greaterThanEqual(low, high)))
-        return 0.0;
+    vec2 low = clamp(foot - reach, -1.0, 1.0), high = clamp(foot + reach, -1.0, 1.0);
+    vec2 middle = 0.5 * (low + high);
+    part = rectangle_polygon(center + middle.x * light.half_x + middle.y * light.half_y,
+                             0.5 * (high.x - low.x) * light.half_x, 0.5 * (high.y - low.y) * light.half_y);
     vec2 step_size = (high - low) / float(POINTS);
     float received = 0.0;
     float spread = 0.0;
@@ -143,16 +143,11 @@ float covered_by_spread(Light light, vec3 center, vec3 normal)
         float distance_squared = dot(to_light, to_light);
         float cosine = -dot(to_light, light.axis) * inversesqrt(distance_squared);
         float weight = max(dot(normal, to_light), 0.0) * cosine / (distance_squared * sqrt(distance_squared));
-        float inside = (1.0 - length(place)) / (0.5 * (step_size.x + step_size.y)) + 0.5;
+        float inside = (1.0 - length(place)) / max(0.5 * (step_size.x + step_size.y), FLOAT_EPSILON) + 0.5;
         received += weight;
         spread += weight * spread_factor(light, cosine) * (light.ellipse ? clamp(inside, 0.0, 1.0) : 1.0);
     }
-    if (received == 0.0)
-        return 0.0;
-    vec2 middle = 0.5 * (low + high);
-    Polygon part = rectangle_polygon(center + middle.x * light.half_x + middle.y * light.half_y,
-                                     0.5 * (high.x - low.x) * light.half_x, 0.5 * (high.y - low.y) * light.half_y);
-    return covered_cosine(part, normal) * spread / received;
+    return received > 0.0 ? spread / received : 0.0;
 }
 
 vec3 area_irradiance(Light light, vec3 center, vec3 normal)
@@ -161,9 +156,14 @@ vec3 area_irradiance(Light light, vec3 center, vec3 normal)
         return vec3(0.0);
     if (angular_size(light, center) < SMALLEST_ANGLE)
         return small_area_irradiance(light, center) * max(dot(normal, normalize(center)), 0.0);
-    float covered = light.spread_norm > 0.0 ? covered_by_spread(light, center, normal)
-                                            : covered_cosine(light_polygon(light, center), normal);
-    return light.emission * (PI * covered);
+    Polygon polygon = light_polygon(light, center);
+    float spread = 1.0;
+    if (light.spread_norm > 0.0)
+        spread = spread_part(light, center, normal, polygon);
+    vec3 tangent, bitangent;
+    orthonormal_basis(normal, tangent, bitangent);
+    mat3 local = transpose(mat3(tangent, bitangent, normal));
+    return light.emission * (PI * spread * cosine_lobe_over(transformed(local, polygon), vec3(0.0, 0.0, 1.0)).z);
 }
 #endif
 
@@ -210,36 +210,6 @@ mat3 view_frame(vec3 normal, vec3 view)
     return mat3(along, cross(normal, along), normal);
 }
 
-/**
- * Radiance that the surface reflects of a polygon of radiance 1, whose corners are given from the surface.
- *
- * A polygon that covers little of the lobe is reflected as its mean direction is; one that covers all, by the albedo.
- */
-vec3 reflected_polygon(Surface surface, Polygon polygon, vec3 normal, vec3 view)
-{
-    mat3 frame = view_frame(normal, view);
-    float n_dot_v = clamp(dot(normal, view), 0.0, 1.0);
-    CoveredLobe lobe = specular_lobe_over(transformed(transpose(frame), polygon), sqrt(surface.alpha), n_dot_v);
-    vec3 by_mean = specular_brdf_cosine(surface, normal, view, frame * lobe.mean) / lobe.density;
-    return lobe.share * mix(by_mean, surface.specular_albedo, lobe.share);
-}
-
-vec3 cone_specular(LightCone cone, Surface surface, vec3 normal, vec3 view)
-{
-    float solid = smoothstep(POINT_TO_SOLID.x, POINT_TO_SOLID.y, cone.sine / surface.alpha);
-    vec3 reflected = vec3(0.0);
-    if (solid < 1.0)
-        reflected = specular_brdf_cosine(surface, normal, view, cone.direction) * (1.0 - solid);
-    if (solid > 0.0) {
-        vec3 x, y;
-        orthonormal_basis(cone.direction, x, y);
-        float cosine = sqrt(max(1.0 - cone.sine * cone.sine, 0.0));
-        Polygon disk = ellipse_polygon(cosine * cone.direction, cone.sine * x, cone.sine * y);
-        reflected += reflected_polygon(surface, disk, normal, view) * (solid / (PI * cone.sine * cone.sine));
-    }
-    return cone.irradiance * reflected;
-}
-
 #ifdef AREA_LIGHTS
 /** Spread factor towards the part of the light that the surface mirrors best: nearest to the reflected view. */
 float mirrored_spread(Light light, vec3 center, vec3 normal, vec3 view)
@@ -253,39 +223,72 @@ float mirrored_spread(Light light, vec3 center, vec3 normal, vec3 view)
     vec3 to_light = center + place.x * light.half_x + place.y * light.half_y;
     return spread_factor(light, -dot(to_light, light.axis) * inversesqrt(dot(to_light, to_light)));
 }
+#endif
 
-vec3 area_specular(Light light, Surface surface, vec3 center, vec3 normal, vec3 view)
+/** A light as a highlight shows it: from its centre where it is small, else as a polygon of uniform radiance. */
+struct Emitter
 {
-    if (!shines_on(light, center))
-        return vec3(0.0);
-    float solid = smoothstep(POINT_TO_SOLID.x, POINT_TO_SOLID.y, angular_size(light, center) / surface.alpha);
-    vec3 reflected = vec3(0.0);
-    if (solid < 1.0)
-        reflected = specular_brdf_cosine(surface, normal, view, normalize(center))
-                    * small_area_irradiance(light, center) * (1.0 - solid);
-    if (solid > 0.0) {
-        float spread = light.spread_norm > 0.0 ? mirrored_spread(light, center, normal, view) : 1.0;
-        reflected += reflected_polygon(surface, light_polygon(light, center), normal, view) * light.emission
-                     * (spread * solid);
-    }
-    return reflected;
+    vec3 direction;         // unit, to its centre
+    vec3 irradiance;        // of a surface that faces it, W/m², from its centre
+    float size;             // rad
+    Polygon polygon;
+    vec3 radiance;
+};
+
+Emitter cone_emitter(LightCone cone)
+{
+    vec3 x, y;
+    orthonormal_basis(cone.direction, x, y);
+    float cosine = sqrt(max(1.0 - cone.sine * cone.sine, 0.0));
+    Polygon disk = ellipse_polygon(cosine * cone.direction, cone.sine * x, cone.sine * y);
+    vec3 radiance = cone.irradiance / max(PI * cone.sine * cone.sine, SMALLEST_CONE * SMALLEST_CONE);
+    return Emitter(cone.direction, cone.irradiance, cone.sine, disk, radiance);
+}
+
+#ifdef AREA_LIGHTS
+Emitter area_emitter(Light light, vec3 center, vec3 normal, vec3 view)
+{
+    vec3 radiance = light.emission;
+    if (light.spread_norm > 0.0)
+        radiance *= mirrored_spread(light, center, normal, view);
+    return Emitter(normalize(center), small_area_irradiance(light, center), angular_size(light, center),
+                   light_polygon(light, center), radiance);
 }
 #endif
 
 /**
  * Radiance towards `view` that the surface reflects specularly of a point, spot, sun or area light, unshadowed.
  *
- * GGX of small lights, linearly transformed cosines of large ones, with the mean of Fresnel's reflectance over the lobe;
- * a spot's edge is taken at the light's centre, an area light's spread at the part that is mirrored best.
+ * Small lights by the BRDF, large ones by linearly transformed cosines: a light that covers little of the lobe is
+ * reflected as its mean direction is, one that covers all of it by the albedo. A spot's edge is taken at the light's
+ * centre, an area light's spread at the part that is mirrored best.
  */
 vec3 analytic_specular(Light light, Surface surface, vec3 position, vec3 normal, vec3 view)
 {
     if (surface.specular_f0 == vec3(0.0))
         return vec3(0.0);
+    Emitter emitter;
 #ifdef AREA_LIGHTS
-    if (light.kind == LIGHT_AREA)
-        return area_specular(light, surface, light.position - position, normal, view);
+    if (light.kind == LIGHT_AREA) {
+        vec3 center = light.position - position;
+        if (!shines_on(light, center))
+            return vec3(0.0);
+        emitter = area_emitter(light, center, normal, view);
+    } else
 #endif
-    return cone_specular(light_cone(light, position), surface, normal, view);
+        emitter = cone_emitter(light_cone(light, position));
+    float solid = smoothstep(POINT_TO_SOLID.x, POINT_TO_SOLID.y, emitter.size / surface.alpha);
+    vec3 reflected = vec3(0.0);
+    if (solid < 1.0)
+        reflected = emitter.irradiance * specular_brdf_cosine(surface, normal, view, emitter.direction) * (1.0 - solid);
+    if (solid > 0.0) {
+        mat3 frame = view_frame(normal, view);
+        float n_dot_v = clamp(dot(normal, view), 0.0, 1.0);
+        Polygon polygon = transformed(transpose(frame), emitter.polygon);
+        CoveredLobe lobe = specular_lobe_over(polygon, sqrt(surface.alpha), n_dot_v);
+        vec3 by_mean = specular_brdf_cosine(surface, normal, view, frame * lobe.mean) / lobe.density;
+        reflected += emitter.radiance * mix(by_mean, surface.specular_albedo, lobe.share) * (lobe.share * solid);
+    }
+    return reflected;
 }
 #endif

@@ -10,9 +10,14 @@
 #include "common/shared_exponent.glsl"
 #include "generated/DirectUniforms.glsl"
 
+// Closed forms know GGX; with Phong's highlights a preview shows lamps by their centres.
+#if defined(PREVIEW) && !defined(PHONG)
+#define WHOLE_LAMPS
+#endif
+
 #ifdef LIGHTS
 #include "common/lights.glsl"
-#ifdef PREVIEW
+#ifdef WHOLE_LAMPS
 #include "common/analytic_lights.glsl"
 #endif
 #ifdef SHADOWS
@@ -95,7 +100,7 @@ LightPoint scattered(Light light, LightPoint point, vec2 random)
 }
 #endif
 
-#ifdef PREVIEW
+#ifdef WHOLE_LAMPS
 /** A lamp as a whole. */
 Reflected lit_by_lamp(Light light, LightPoint point, Shading shading)
 {
@@ -164,13 +169,13 @@ void add_light(int index, Shading shading, inout Reflected sum)
 #endif
     Light light = fetch_light(index);
     LightPoint point = fetch_light_point(index);
-#if defined(PREVIEW) && defined(MESH_LIGHTS)
+#if defined(WHOLE_LAMPS) && defined(MESH_LIGHTS)
     Reflected reflected;
     if (light.kind == LIGHT_MESH)
         reflected = lit_by_point(index, light, point, shading);
     else
         reflected = lit_by_lamp(light, point, shading);
-#elif defined(PREVIEW)
+#elif defined(WHOLE_LAMPS)
     Reflected reflected = lit_by_lamp(light, point, shading);
 #else
     Reflected reflected = lit_by_point(index, light, point, shading);

@@ -43,7 +43,7 @@ class CompositePass:
         films = [set(passes), *(set(pair) for pair in combinations(passes, 2)), *({name} for name in passes)]
         yield from (_program(frozenset(view)) for view in shown)
         for film in films:
-            for read in subsets(("SPECULAR", "DIFFUSE_ROUGHNESS", "SPLIT", "ENVIRONMENT")):
+            for read in subsets(("SPECULAR", "DIFFUSE_ROUGHNESS", "PHONG", "SPLIT", "ENVIRONMENT")):
                 yield _program(read | film | {"DIRECT"})
 
     def prepare(self, frame: Frame, planned: PlannedPass) -> None:

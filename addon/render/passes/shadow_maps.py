@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
-from ...scene.arrays import Int64Array
+from ...scene.arrays import Float32Array, Int64Array
 from ..atlas import Slot
 from ..caster_clusters import CasterClusters
 from ..casters import CasterList, Casters
@@ -75,6 +75,7 @@ class ShadowMapsPass:
         self._sources: tuple[ShadowSource, ...] = ()
         self._views: dict[int, dict[tuple[int, float], tuple[_View | None, ...]]] = {}
         self._largest = 0
+        self._rows: dict[tuple[Hashable, Slot], Float32Array] = {}
         self._table: moderngl.Texture | None = None
 
     @classmethod
@@ -99,6 +100,7 @@ class ShadowMapsPass:
             self._receivers = visible_receivers(tiles, TILE_SIZE, frame.view, frame.pool.size, _JITTER_MARGIN)
             self._sources = shadow_sources(frame.lighting.plan)
             self._views = {}
+            self._rows = {}
             self._largest = frame.settings.shadow_map_size
         views = self._current_views(frame, casters, self._receivers)
         sizes = {view.key: view.shadow_map.size for maps in views.values() for view in maps if view is not None}
@@ -205,14 +207,21 @@ class ShadowMapsPass:
         self, frame: Frame, views: dict[int, tuple[_View | None, ...]], slots: dict[Hashable, Slot]
     ) -> None:
         rows = [empty_row()]
+        held, self._rows = self._rows, {}
         for source in self._sources:
             maps = views.get(source.index, ())
             frame.lighting.samples[source.index, 0, 3] = SHADOW_CUBE if maps and source.is_cube else len(maps)
             frame.lighting.samples[source.index, 1, 3] = len(rows)
-            rows += [
-                shadow_row(view.shadow_map.camera, slots[view.key], frame.view.position) if view else empty_row()
-                for view in maps
-            ]
+            for view in maps:
+                if view is None:
+                    rows.append(empty_row())
+                    continue
+                place = view.key, slots[view.key]
+                row = held.get(place)
+                if row is None:
+                    row = shadow_row(view.shadow_map.camera, slots[view.key], frame.view.position)
+                self._rows[place] = row
+                rows.append(row)
         image = as_texels(np.stack(rows))
         size = (image.shape[1], image.shape[0])
         if self._table is None or self._table.size != size:
