@@ -82,7 +82,7 @@ class CasterClusters:
         chosen[placed.owner[boxes_inside(placed.boxes, planes)]] = True
         wanted = np.zeros(len(self._draws), np.bool_)
         wanted[casters] = True
-        chosen[::7] = False
+        chosen &= wanted[placed.caster]
         found: dict[int, list[tuple[int, int]]] = {}
         for index, first, count in runs(chosen, placed.caster, placed.first, placed.count):
             found.setdefault(index, []).append((first, count))

@@ -10,8 +10,14 @@ import numpy as np
 
 from ..scene.arrays import Float64Array, Int64Array
 
-_RATIOS = (0.3819660112501051, 0.6180339887498949, 0.7548776662466927)
+_RATIOS = (0.6180339887498949, 0.7548776662466927)
 """Golden ratios (of the plane's lattice and of space's): steps along an axis that fill it evenly, however many."""
+
+_STRETCH = 17
+"""How many successive points are spread evenly along every axis, at least."""
+
+_MOST_STEPS = 2048
+"""Orders of a lattice's points that are tried."""
 
 _BALL_TABLE_SIZE = 4097
 
@@ -43,8 +49,21 @@ def lattice_points(indices: Int64Array, count: int, shifts: Float64Array) -> Flo
 @lru_cache(maxsize=64)
 def _generators(count: int) -> tuple[int, int, int]:
     """The lattice's steps along each axis, in parts of `count`."""
-    step, second, third = (_coprime(count, ratio) for ratio in _RATIOS)
+    second, third = (_coprime(count, ratio) for ratio in _RATIOS)
+    step = _even_step(count, (1.0 / count, second / count, third / count))
     return step, step * second % count, step * third % count
+
+
+@lru_cache(maxsize=64)
+def _even_step(count: int, ratios: tuple[float, ...]) -> int:
+    """A step, coprime to `count`, whose products with all ratios have few multiples near whole numbers: points in that
+    order leave no axis uncovered for long, and all come once."""
+    steps = (np.arange(min(count, _MOST_STEPS)) + count // 3) % count
+    steps = steps[np.gcd(steps, count) == 1]
+    multiples = np.arange(1, max(min(count, _STRETCH), 2))
+    turns = np.modf(np.multiply.outer(np.outer(steps, ratios), multiples))[0]
+    evenness = multiples * np.minimum(turns, 1.0 - turns)
+    return int(steps[evenness.min(axis=(1, 2)).argmax()])
 
 
 def _coprime(count: int, ratio: float) -> int:
@@ -104,9 +123,8 @@ def spiral_points(indices: Int64Array, count: int, shift: float) -> Float64Array
     On the sphere they are a Fibonacci spiral (Swinbank and Purser 2006), the evenest of simple patterns, in such an
     order that any stretch of it is spread evenly, too. `shift`: turns it.
     """
-    step, _, _ = _generators(count)
-    turn = indices * step % count
-    return np.stack([np.modf(turn * _RATIOS[1] + shift)[0], (turn + 0.5) / count], axis=-1)
+    turn = indices * _even_step(count, (1.0 / count, _RATIOS[0])) % count
+    return np.stack([np.modf(turn * _RATIOS[0] + shift)[0], (turn + 0.5) / count], axis=-1)
 
 
 @lru_cache(maxsize=1)

@@ -79,12 +79,16 @@ class WorldTable:
         if world is None or not view_layer.use_sky:
             return World(), ()
         black = _black(world)
+        casts_shadow = getattr(getattr(world, "cycles", None), "use_shadows", True)  # since Blender 5.2
         if not has_nodes(world):
             red, green, blue = world.color
             return replace(black, radiance=(red, green, blue)), ()
         evaluator = WorldEvaluator(f"World “{world.name}”", images)
         radiance = _radiance(world.node_tree, evaluator)
         lights = _suns(radiance, world.name, black, evaluator)
+        if not casts_shadow:
+            evaluator.tell("only its sun can be without shadows yet; its other light is blocked by what is in its way")
+            lights = tuple(replace(light, casts_shadow=False) for light in lights)
         mirrored = self._mirror(world.name, radiance, black)
         messages.extend(_KEY, evaluator.warnings)
         return mirrored, lights

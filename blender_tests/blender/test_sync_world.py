@@ -151,6 +151,16 @@ def test_ray_visibility(kind):
     assert sun.specular_factor == float(kind != "glossy")
 
 
+@pytest.mark.skipif(bpy.app.version < (5, 2, 0), reason="Blender 5.2 lets a world cast no shadows")
+def test_a_world_without_shadows():
+    sky_world()
+    assert read()[1][0].casts_shadow
+    bpy.context.scene.world.cycles.use_shadows = False
+    _, (sun,), texts = read()
+    assert not sun.casts_shadow
+    assert_texts(texts, "“Sky”", "shadows")
+
+
 def test_encoded_images_are_decoded():
     image_world(make_image(color=(0.5, 0.5, 0.5, 1.0), size=(4, 2)))
     world, _, _ = read()

@@ -15,6 +15,7 @@ from addon.render.light_reach import (
     lights_out_of_reach,
     peak_intensity,
     roulette,
+    rounded_reach,
     sampled_reach,
 )
 from addon.scene import AreaShape, LightKind
@@ -127,6 +128,16 @@ def test_the_farthest_reach_is_that_of_the_luckiest_sample(count, samples, seed)
     full, keys = np.arange(1.0, count + 1.0), [str(index) for index in range(count)]
     every = [sampled_reach(full, roulette(keys, np.full(count, sample), seed)) for sample in range(samples)]
     assert np.array_equal(farthest_reach(full, keys, samples, seed), np.max(every, axis=0))
+
+
+def test_rounded_reaches_are_few_and_never_shorter():
+    full = np.array([0.0, inf, *np.full(500, 0.3)])
+    reach = sampled_reach(full, roulette([str(index) for index in range(502)], np.arange(502), 1))
+    rounded = rounded_reach(full, reach)
+    assert rounded[:2].tolist() == [0.0, inf]
+    assert (rounded[2:] >= reach[2:]).all()
+    assert (rounded[2:] < 2.0 * reach[2:]).all()
+    assert len(set(rounded[2:].tolist())) < 10
 
 
 def left_out(lights, reaches, **changes):
