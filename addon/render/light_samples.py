@@ -14,10 +14,10 @@ _RATIOS = (0.6180339887498949, 0.7548776662466927)
 """Golden ratios (of the plane's lattice and of space's): steps along an axis that fill it evenly, however many."""
 
 _STRETCH = 17
-"""How many successive points are spread evenly along every axis, at least."""
+"""Successive points that are spread evenly along every axis, whatever their number, are fewer than this."""
 
-_MOST_STEPS = 2048
-"""Orders of a lattice's points that are tried."""
+_MOST_STEPS = 512
+"""How many orders of a pattern's points are tried."""
 
 _BALL_TABLE_SIZE = 4097
 
@@ -48,22 +48,37 @@ def lattice_points(indices: Int64Array, count: int, shifts: Float64Array) -> Flo
 
 @lru_cache(maxsize=64)
 def _generators(count: int) -> tuple[int, int, int]:
-    """The lattice's steps along each axis, in parts of `count`."""
+    """The lattice's steps along each axis, in parts of `count`.
+
+    The first only orders the same lattice's points: that order is taken in which points that follow one another are
+    far from one another along every axis.
+    """
     second, third = (_coprime(count, ratio) for ratio in _RATIOS)
-    step = _even_step(count, (1.0 / count, second / count, third / count))
+    steps = _possible_steps(count)
+    multiples = np.arange(1, max(min(count, _STRETCH), 2))
+    turns = np.multiply.outer(np.outer(steps, (1, second, third)) % count, multiples) % count / count
+    evenness = multiples * np.minimum(turns, 1.0 - turns)
+    step = int(steps[evenness.min(axis=(1, 2)).argmax()])
     return step, step * second % count, step * third % count
 
 
 @lru_cache(maxsize=64)
-def _even_step(count: int, ratios: tuple[float, ...]) -> int:
-    """A step, coprime to `count`, whose products with all ratios have few multiples near whole numbers: points in that
-    order leave no axis uncovered for long, and all come once."""
+def _spiral_step(count: int) -> int:
+    """By how many of a spiral's `count` places to go on, so that the first few directions point everywhere alike."""
+    steps = _possible_steps(count)
+    length = min(count, 4 * _STRETCH)
+    places = np.outer(steps, np.arange(length)) % count
+    z, azimuth = (2 * places + 1) / count - 1.0, 2.0 * np.pi * _RATIOS[0] * places
+    around = np.sqrt(1.0 - z * z)
+    sums = np.cumsum([around * np.cos(azimuth), around * np.sin(azimuth), z], axis=-1)
+    lopsided = np.linalg.norm(sums, axis=0) / np.sqrt(np.arange(1, length + 1))
+    return int(steps[lopsided[:, 2:].max(axis=1, initial=0.0).argmin()])
+
+
+def _possible_steps(count: int) -> Int64Array:
+    """(S,) those from 1/3 of `count` on with which all of its numbers come once."""
     steps = (np.arange(min(count, _MOST_STEPS)) + count // 3) % count
-    steps = steps[np.gcd(steps, count) == 1]
-    multiples = np.arange(1, max(min(count, _STRETCH), 2))
-    turns = np.modf(np.multiply.outer(np.outer(steps, ratios), multiples))[0]
-    evenness = multiples * np.minimum(turns, 1.0 - turns)
-    return int(steps[evenness.min(axis=(1, 2)).argmax()])
+    return steps[np.gcd(steps, count) == 1]
 
 
 def _coprime(count: int, ratio: float) -> int:
@@ -123,7 +138,7 @@ def spiral_points(indices: Int64Array, count: int, shift: float) -> Float64Array
     On the sphere they are a Fibonacci spiral (Swinbank and Purser 2006), the evenest of simple patterns, in such an
     order that any stretch of it is spread evenly, too. `shift`: turns it.
     """
-    turn = indices * _even_step(count, (1.0 / count, _RATIOS[0])) % count
+    turn = indices * _spiral_step(count) % count
     return np.stack([np.modf(turn * _RATIOS[0] + shift)[0], (turn + 0.5) / count], axis=-1)
 
 

@@ -52,12 +52,14 @@ class MeshLight:
         return float(np.linalg.norm(self.triangles - self.center, axis=-1).max())
 
     def point(self, u: Float64Array) -> tuple[Float64Array, Float64Array]:
-        """Point and unit front normal (3,) for u (3,) in [0, 1): uniform over the area."""
+        """Point and unit front normal (3,) for u (3,) in [0, 1), of which it takes two: uniform over the area."""
         at = min(int(np.searchsorted(self.cumulative, u[0], side="right")), len(self.triangles) - 1)
         a, b, c = self.triangles[at]
-        root = np.sqrt(u[1])  # Turk 1990, "Generating Random Points in Triangles"
+        before = self.cumulative[at - 1] if at > 0 else 0.0
+        within = min((u[0] - before) / (self.cumulative[at] - before), 1.0)
+        root = np.sqrt(within)  # Turk 1990, "Generating Random Points in Triangles"
         normal = np.cross(b - a, c - a)
-        return a + root * (1.0 - u[2]) * (b - a) + root * u[2] * (c - a), normal / np.linalg.norm(normal)
+        return a + root * (1.0 - u[1]) * (b - a) + root * u[1] * (c - a), normal / np.linalg.norm(normal)
 
 
 def mesh_lights(scene: Scene) -> tuple[tuple[MeshLight, ...], tuple[MeshLight, ...]]:

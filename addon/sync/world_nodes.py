@@ -6,6 +6,7 @@ Nodes that are not told of here are read as constants, as for materials, and rep
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import bpy
@@ -138,13 +139,20 @@ def _sky_texture(source: Source, evaluator: WorldEvaluator) -> Field:
     aerosols = node.dust_density if before_5 else node.aerosol_density
     sky = Sky(
         Air(node.altitude, node.air_density, aerosols, node.ozone_density),
-        sun_elevation=node.sun_elevation,
-        sun_rotation=node.sun_rotation,
+        *_sun_position(node.sun_elevation, node.sun_rotation),
         rgb_from_xyz=rgb_from_xyz,
         multiple=node.sky_type == "MULTIPLE_SCATTERING",
         before_5=before_5,
     )
     return SkyTexture(inputs, sky, max(node.sun_size, SMALLEST_SUN) if node.sun_disc else 0.0, node.sun_intensity)
+
+
+def _sun_position(elevation: float, rotation: float) -> tuple[float, float]:
+    """Elevation within ±90° and rotation (rad) of a sun that may have gone on beyond the zenith, over and over."""
+    elevation = (elevation + math.pi) % (2.0 * math.pi) - math.pi
+    if abs(elevation) <= 0.5 * math.pi:
+        return elevation, rotation
+    return math.copysign(math.pi, elevation) - elevation, rotation + math.pi
 
 
 def _rgb_from_xyz() -> tuple[float, ...]:

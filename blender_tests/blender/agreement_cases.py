@@ -176,7 +176,7 @@ def pierced_caster(*size: int, **surfaces: Any) -> bpy.types.Scene:
     return scene
 
 
-def pierced(squares: int = 4, texels: int = 16) -> bpy.types.Material:
+def pierced(squares: int = 2, texels: int = 16) -> bpy.types.Material:
     """A material that is there on every other square of a chequerboard."""
     rows, columns = np.meshgrid(np.arange(squares * texels), np.arange(squares * texels), indexing="ij")
     pixels = np.ones((*rows.shape, 4), np.float32)

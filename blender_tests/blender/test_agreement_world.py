@@ -169,6 +169,7 @@ def sky(kind, **properties):
 SKIES = {
     "noon": {"sun_elevation": 1.2, "sun_rotation": 1.0},
     "evening": {"sun_elevation": 0.05, "sun_rotation": -0.5, "altitude": 100.0},
+    "past the zenith": {"sun_elevation": 2.5 - 4.0 * np.pi, "sun_rotation": 1.0},
     "dusk": {"sun_elevation": -0.05, "sun_rotation": 3.0},
     "mountain haze": {"sun_elevation": 0.4, "altitude": 3000.0, "aerosols": 4.0, "ozone_density": 2.0},
     "thin air": {"sun_elevation": 0.7, "altitude": 30000.0, "air_density": 0.5, "aerosols": 0.0, "ozone_density": 0.0},
@@ -220,7 +221,7 @@ def sun_direction(texture):
     )
 
 
-@pytest.mark.parametrize("case", [(0.5, 0.0095, 100.0), (0.003, 0.0095, 1.0), (0.3, 0.1, 5000.0)])
+@pytest.mark.parametrize("case", [(0.5, 0.0095, 100.0), (0.003, 0.0095, 1.0), (0.3, 0.1, 5000.0), (2.5, 0.02, 0.0)])
 @pytest.mark.parametrize("kind", PHYSICAL_SKIES)
 def test_sun_disc(kind, case, tmp_path):
     elevation, size, altitude = case

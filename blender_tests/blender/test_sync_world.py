@@ -156,6 +156,7 @@ def test_a_world_without_shadows():
     sky_world()
     assert read()[1][0].casts_shadow
     bpy.context.scene.world.cycles.use_shadows = False
+    bpy.context.scene.world.update_tag()
     _, (sun,), texts = read()
     assert not sun.casts_shadow
     assert_texts(texts, "“Sky”", "shadows")

@@ -41,7 +41,11 @@ def test_texels_cover_the_sphere(size):
     assert texel_solid_angles(height, width).sum() * width == pytest.approx(4.0 * np.pi)
 
 
-@given(hnp.arrays(np.float32, st.tuples(st.integers(1, 6), st.integers(1, 6), st.just(3)), elements=st.floats(0, 9)))
+@given(
+    hnp.arrays(
+        np.float32, st.tuples(st.integers(1, 6), st.integers(1, 6), st.just(3)), elements=st.floats(0, 9, width=32)
+    )
+)
 def test_texels_are_found_again(pixels):
     height, width = pixels.shape[:2]
     np.testing.assert_allclose(look_up(pixels, texel_directions(height, width)), pixels, atol=1e-4)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-from math import ceil, pi, sqrt
+from math import pi, sqrt
 
 import numpy as np
 import pytest
@@ -76,14 +76,12 @@ def test_a_lattice_is_even_along_each_axis(count, seed):
     np.testing.assert_allclose(gaps, 1.0 / count, atol=1e-9)
 
 
-@given(st.integers(16, 2048), st.floats(0.0, 1.0), st.integers(4, 64))
-def test_any_stretch_of_a_lattice_is_spread_evenly(count, begin, length):
-    """Steps near golden ratios: discrepancy of n successive points below (3 + 2 ln n)/n, random ones' is ~ 1/√n."""
-    length = min(length, count)
-    start = int(begin * (count - length))
-    points = lattice(count, start, start + length)
-    for axis in range(2):
-        assert star_discrepancy(points[:, axis]) <= min((3.0 + 2.0 * np.log(length)) / length, 1.0)
+@given(st.integers(16, 4096), st.floats(0.0, 1.0))
+def test_a_film_that_is_stopped_early_has_seen_all_of_a_light(count, begin):
+    """Any 16 successive points: along no axis is a stretch missing; random ones' discrepancy is about 0.87/√16."""
+    start = int(begin * (count - 16))
+    points = lattice(count, start, start + 16)
+    assert max(star_discrepancy(points[:, axis]) for axis in range(3)) < 0.25
 
 
 @pytest.mark.parametrize("count", [16, 64, 100, 256, 1024])
@@ -162,7 +160,7 @@ def test_the_ball_is_a_uniform_disk_from_every_side(direction):
     points = balls(4096)
     along = points @ np.array(direction, float)
     squared = (points**2).sum(axis=1) - along**2
-    assert star_discrepancy(squared) < 0.01
+    assert star_discrepancy(squared) < 0.02
     np.testing.assert_allclose((points**2).mean(axis=0), 0.25, atol=2e-3)
     for power in (1, 2, 3):
         assert (squared**power).mean() == pytest.approx(1.0 / (power + 1.0), abs=3e-3)
@@ -170,7 +168,7 @@ def test_the_ball_is_a_uniform_disk_from_every_side(direction):
 
 def test_the_ball_seen_as_a_disk_is_as_even_in_angle():
     points = balls(4096)
-    assert star_discrepancy(np.arctan2(points[:, 1], points[:, 0]) / (2 * pi) + 0.5) < 0.01
+    assert star_discrepancy(np.arctan2(points[:, 1], points[:, 0]) / (2 * pi) + 0.5) < 0.02
 
 
 @given(st.integers(1, 2048), st.floats(0.0, 1.0, exclude_max=True))
@@ -197,11 +195,16 @@ def test_no_two_points_of_a_spiral_are_near_each_other(count):
     assert np.arccos(cosines.max()) > 2.5 / sqrt(count)
 
 
-@pytest.mark.parametrize("count", [64, 256, 1000])
-@pytest.mark.parametrize("share", [0.25, 0.5])
-def test_a_stretch_of_a_spiral_is_spread_over_the_sphere(count, share):
-    """The mean direction is 0: random ones' length is 1/√n."""
-    length = ceil(count * share)
-    for start in range(0, count - length, max(count // 7, 1)):
-        directions = on_sphere(spiral_points(np.arange(start, start + length), count, 0.3))
-        assert np.linalg.norm(directions.mean(axis=0)) < 0.6 / sqrt(length)
+@given(st.integers(16, 4096), st.sampled_from([8, 16, 32, 64]))
+def test_a_film_that_is_stopped_early_has_seen_all_of_the_world(count, length):
+    """The mean of its directions is 0; that of as many random ones has the length 1/√n."""
+    length = min(length, count)
+    directions = on_sphere(spiral_points(np.arange(length), count, 0.3))
+    assert np.linalg.norm(directions.mean(axis=0)) < 0.8 / sqrt(length)
+
+
+@given(st.integers(64, 4096), st.floats(0.0, 1.0))
+def test_later_parts_of_a_spiral_are_spread_as_well(count, begin):
+    start = int(begin * (count - 64))
+    directions = on_sphere(spiral_points(np.arange(start, start + 64), count, 0.3))
+    assert np.linalg.norm(directions.mean(axis=0)) < 1.0 / sqrt(64)

@@ -47,7 +47,8 @@ def test_irradiance_of_a_point():
 
 @pytest.mark.parametrize("alpha", [0.05, 0.1, 0.4, 1.0])
 def test_lobes_of_a_point(alpha):
-    """Flux times the lobe D cos / ∫ D cos; the finest is as wide as a few nodes, which shows: 1 % of the peak."""
+    """Flux times the lobe D cos / ∫ D cos. Rows are shared between nodes h = π/160 apart, which adds a variance of at
+    most h²/4 to a lobe whose curvature at its peak is 4/(2α)²: up to 2 % of the peak at α = 0.05."""
     pixels, direction, flux = one_texel(512, 1024, 350, 777)
 
     def unscaled(cosine):
@@ -57,7 +58,7 @@ def test_lobes_of_a_point(alpha):
     angle = (np.arange(400000) + 0.5) / 400000 * 0.5 * np.pi
     integral = 2.0 * np.pi * (unscaled(np.cos(angle)) * np.sin(angle)).sum() * 0.5 * np.pi / 400000
     expected = flux * unscaled(nodes() @ direction) / integral
-    np.testing.assert_allclose(blurred(harmonics(pixels), lobe(alpha))[..., 0], expected, atol=0.012 * expected.max())
+    np.testing.assert_allclose(blurred(harmonics(pixels), lobe(alpha))[..., 0], expected, atol=0.02 * expected.max())
 
 
 def test_poles_and_seam_agree_with_themselves():
