@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What of the direct pass a scene needs. Pure: no OpenGL, no Blender."""
+"""What of the passes that light surfaces a scene needs. Pure: no OpenGL, no Blender."""
 
 from ..scene import ALL_GROUPS, LightKind, RenderSettings, Scene, ShadingModel
 from .light_reach import MANY_LIGHTS
@@ -23,6 +23,9 @@ DIRECT_DEFINES = (
 )
 """What the direct pass compiles only where a scene has it: drivers that draw on the CPU run every branch they have."""
 
+GOURAUD_DEFINES = tuple(name for name in DIRECT_DEFINES if name not in ("DIFFUSE_ROUGHNESS", "SHADOWS", "MANY_LIGHTS"))
+"""What the gouraud pass compiles in the same way. It always has PHONG."""
+
 
 def direct_needs(scene: Scene, settings: RenderSettings, lights: LightPlan) -> dict[str, tuple[bool, str]]:
     """Per define of the direct pass, whether the scene needs it, and why not if it does not."""
@@ -44,7 +47,7 @@ def direct_needs(scene: Scene, settings: RenderSettings, lights: LightPlan) -> d
             physical and any(material.diffuse_roughness > 0.0 for material in materials),
             "no material has diffuse roughness, or Phong shading knows none",
         ),
-        "PHONG": (settings.shading_model is ShadingModel.PHONG, "shading is not Phong's"),
+        "PHONG": (not physical, "shading is not Phong's"),
         "WORLD": (world.shines, "the world is black or lights nothing"),
         "ENVIRONMENT": (world.shines and world.environment is not None, "the world has one colour"),
         "EMISSION": (any(material.is_emissive for material in materials), "no emissive material"),
@@ -64,7 +67,7 @@ def direct_program_defines(defines: frozenset[str], *, preview: bool) -> frozens
     if preview:
         chosen.add("PREVIEW")
         chosen.discard("WORLD_LIGHTS")
-    elif "SPECULAR" not in defines:
+    elif not {"SPECULAR", "WORLD_LIGHTS"} <= defines:
         chosen -= {"WORLD", "ENVIRONMENT"}
     if chosen & set(LIGHT_DEFINES):
         chosen.add("LIGHTS")

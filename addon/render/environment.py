@@ -45,7 +45,7 @@ class EnvironmentTextures:
 
     def __init__(self, device: Device) -> None:
         self._device = device
-        self._version: int | None = None
+        self._shown: tuple[str, int] | None = None
         self._textures: dict[str, moderngl.Texture | moderngl.TextureArray] = {}
 
     def bind(self, environment: EnvironmentMap, spec: ProgramSpec) -> None:
@@ -53,9 +53,10 @@ class EnvironmentTextures:
 
         Raises RenderError naming the map where graphics memory has no room for it.
         """
-        if self._version != environment.version:
+        shown = (environment.key, environment.version)
+        if self._shown != shown:
             self.release()
-            self._version = environment.version
+            self._shown = shown
         for sampler in ENVIRONMENT_SAMPLERS:
             if sampler in spec.samplers:
                 if sampler not in self._textures:

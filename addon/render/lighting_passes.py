@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The passes that direct light needs, and why the others are left out. Pure: no OpenGL, no Blender."""
 
-from ..scene import Channel, DebugView, RenderSettings, Scene
-from .direct_needs import direct_needs
+from ..scene import Channel, DebugView, RenderSettings, Scene, ShadingModel
+from .direct_needs import DIRECT_DEFINES, GOURAUD_DEFINES, direct_needs
 from .layout import TargetSpec, depth_tiles_target, light_tiles_target
 from .light_reach import MANY_LIGHTS
 from .lighting_plan import LightPlan
@@ -11,17 +11,29 @@ from .planned_pass import LeftOut, PlannedPass
 SPLIT_TARGETS = {Channel.DIFFUSE_DIRECT: "direct.diffuse", Channel.GLOSSY_DIRECT: "direct.glossy"}
 """Film channel -> what the direct pass writes of the first layer where the film wants it."""
 
+_PER_VERTEX = (
+    LeftOut("depth_tiles", "neither shadow maps nor lamps by tiles"),
+    LeftOut("shadow_maps", "Gouraud shading lights vertices, which are too few to show shadows"),
+    LeftOut("light_tiles", "Gouraud shading asks every lamp at each vertex"),
+    LeftOut("direct", "Gouraud shading lights vertices in place of pixels"),
+)
+
 
 def plan_lighting_passes(
     scene: Scene, settings: RenderSettings, lights: LightPlan, layers: int, left_out: list[LeftOut]
 ) -> tuple[PlannedPass, ...]:
-    """Tiles, shadow maps and shading of `layers` layers, in order; the direct pass is the last. None where it is."""
-    direct = _plan_direct(scene, settings, lights, layers, left_out)
-    if direct is None:
+    """Tiles, shadow maps and shading of `layers` layers, in order; what shades is the last. None where nothing does."""
+    gouraud = settings.shading_model is ShadingModel.GOURAUD
+    shading = _plan_shading(scene, settings, lights, layers, left_out, gouraud=gouraud)
+    if shading is None:
         left_out += [LeftOut(name, "no direct light") for name in ("depth_tiles", "shadow_maps", "light_tiles")]
         return ()
+    if gouraud:
+        left_out += _PER_VERTEX
+        return (shading,)
+    left_out.append(LeftOut("gouraud", "shading is not Gouraud's"))
     tiles = _plan_depth_tiles(lights, layers, left_out)
-    return (*tiles, *_plan_shadow_maps(lights, left_out), *_plan_light_tiles(lights, layers, left_out), direct)
+    return (*tiles, *_plan_shadow_maps(lights, left_out), *_plan_light_tiles(lights, layers, left_out), shading)
 
 
 def _plan_depth_tiles(lights: LightPlan, layers: int, left_out: list[LeftOut]) -> tuple[PlannedPass, ...]:
@@ -45,8 +57,14 @@ def _plan_light_tiles(lights: LightPlan, layers: int, left_out: list[LeftOut]) -
     return (PlannedPass("light_tiles", reads=("tiles.depth",), writes=(light_tiles_target(layers, lights.count),)),)
 
 
-def _plan_direct(
-    scene: Scene, settings: RenderSettings, lights: LightPlan, layers: int, left_out: list[LeftOut]
+def _plan_shading(
+    scene: Scene,
+    settings: RenderSettings,
+    lights: LightPlan,
+    layers: int,
+    left_out: list[LeftOut],
+    *,
+    gouraud: bool,
 ) -> PlannedPass | None:
     lit = lights.count > 0
     emissive = any(material.is_emissive for material in scene.materials.values())
@@ -59,21 +77,25 @@ def _plan_direct(
     if settings.debug_view not in (DebugView.NONE, DebugView.DIRECT) and not settings.deep_output:
         left_out.append(LeftOut("direct", "the debug view shows the G-buffer only"))
         return None
-    needs = direct_needs(scene, settings, lights)
-    left_out += [LeftOut(f"direct {name.lower()}", reason) for name, (wanted, reason) in needs.items() if not wanted]
+    name, known = ("gouraud", GOURAUD_DEFINES) if gouraud else ("direct", DIRECT_DEFINES)
+    needs = {define: need for define, need in direct_needs(scene, settings, lights).items() if define in known}
+    left_out += [
+        LeftOut(f"{name} {define.lower()}", reason) for define, (wanted, reason) in needs.items() if not wanted
+    ]
     reads = ["view_depth"]
     if lit:
-        reads += ["normal", "base_color", "material"]
+        reads += ["base_color", "material"] if gouraud else ["normal", "base_color", "material"]
     if emissive:
         reads.append("emission")
-    defines = {name for name, (wanted, _) in needs.items() if wanted}
+    defines = {define for define, (wanted, _) in needs.items() if wanted}
     split = settings.channels & SPLIT_TARGETS.keys()
     if split:
         defines.add("SPLIT")
-    others = tuple(TargetSpec(name, 4, "f4", 1) for name in SPLIT_TARGETS.values()) if split else ()
+    others = tuple(TargetSpec(target, 4, "f4", 1) for target in SPLIT_TARGETS.values()) if split else ()
+    tiles = ("tiles.lights",) if lights.many and not gouraud else ()
     return PlannedPass(
-        "direct",
-        reads=(*(f"gbuffer.{name}" for name in reads), *(("tiles.lights",) if lights.many else ())),
+        name,
+        reads=(*(f"gbuffer.{channel}" for channel in reads), *tiles),
         writes=(TargetSpec("direct.radiance", 4, "f4", layers), *others),
         defines=frozenset(defines),
     )

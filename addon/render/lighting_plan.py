@@ -43,7 +43,7 @@ def plan_lights(
     """The lights of a picture, and (name, reason) of what is left out."""
     left_out: list[tuple[str, str]] = []
     lights = _lights_in_reach(scene, settings, camera, left_out)
-    surfaces, dim = mesh_lights(scene)
+    surfaces, dim = mesh_lights(scene, settings.alpha_threshold)
     left_out += [
         (f"light of {light.name}", "too faint to be sampled as a light; left to indirect light") for light in dim
     ]

@@ -62,12 +62,13 @@ class MeshLight:
         return a + root * (1.0 - u[1]) * (b - a) + root * u[1] * (c - a), normal / np.linalg.norm(normal)
 
 
-def mesh_lights(scene: Scene) -> tuple[tuple[MeshLight, ...], tuple[MeshLight, ...]]:
+def mesh_lights(scene: Scene, alpha_threshold: float) -> tuple[tuple[MeshLight, ...], tuple[MeshLight, ...]]:
     """The emissive surfaces worth sampling, strongest first, and those that are left to indirect light.
 
-    Those whose material is marked for it come whatever their share.
+    Those whose material is marked for it come whatever their share; of one batch's others only the largest are considered.
+    What has less alpha than `alpha_threshold` is not there.
     """
-    every = sorted(_candidates(scene), key=lambda light: (not light.marked, -light.power, light.key))
+    every = sorted(_candidates(scene, alpha_threshold), key=lambda light: (not light.marked, -light.power, light.key))
     total = sum(light.power for light in every)
     worth = [light for light in every if light.marked or light.power >= SMALLEST_SHARE * total]
     marked = sum(light.marked for light in worth)
@@ -75,21 +76,26 @@ def mesh_lights(scene: Scene) -> tuple[tuple[MeshLight, ...], tuple[MeshLight, .
     return tuple(sampled), tuple(light for light in every if light not in sampled)
 
 
-def _candidates(scene: Scene) -> Iterator[MeshLight]:
+def _candidates(scene: Scene, alpha_threshold: float) -> Iterator[MeshLight]:
     for batch in scene.batches:
         mesh = scene.meshes[batch.mesh]
         for slot in mesh.slots:
             material = scene.materials[batch.materials[min(slot.slot, len(batch.materials) - 1)]]
-            if material.is_emissive and material.emission_sampling is not EmissionSampling.NONE:
+            shines = material.is_emissive and material.alpha >= alpha_threshold
+            if shines and material.emission_sampling is not EmissionSampling.NONE:
                 yield from _instances(batch, mesh, slot, material)
 
 
 def _instances(batch: InstanceBatch, mesh: Mesh, slot: SlotRange, material: Material) -> Iterator[MeshLight]:
     corners = mesh.positions[mesh.triangles[slot.first : slot.first + slot.count]].astype(np.float64)
-    for row in range(min(batch.count, GREATEST_COUNT + 1)):
+    sampling = material.emission_sampling
+    marked = sampling is not EmissionSampling.AUTO
+    volumes = np.linalg.det(batch.matrices[:, :3, :3])
+    largest = np.argsort(-np.abs(volumes), kind="stable")[: None if marked else GREATEST_COUNT + 1]
+    for row in largest.tolist():
         matrix = batch.matrices[row]
         triangles = corners @ matrix[:3, :3].T + matrix[:3, 3]
-        if np.linalg.det(matrix[:3, :3]) < 0.0:  # mirrored: the front stays the front
+        if volumes[row] < 0.0:  # mirrored: the front stays the front
             triangles = triangles[:, ::-1]
         areas = 0.5 * np.linalg.norm(
             np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=-1
@@ -98,7 +104,6 @@ def _instances(batch: InstanceBatch, mesh: Mesh, slot: SlotRange, material: Mate
         area = float(areas[solid].sum())
         if area == 0.0:
             continue
-        sampling = material.emission_sampling
         yield MeshLight(
             key=f"{batch.key}/{slot.slot}/{batch.ids[row]}",
             name=f"{mesh.name} ({material.name})",
@@ -109,5 +114,5 @@ def _instances(batch: InstanceBatch, mesh: Mesh, slot: SlotRange, material: Mate
             front=sampling is not EmissionSampling.BACK,
             back=sampling is not EmissionSampling.FRONT,
             link_group=batch.link_group,
-            marked=sampling is not EmissionSampling.AUTO,
+            marked=marked,
         )

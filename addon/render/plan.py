@@ -103,7 +103,8 @@ def plan(scene: Scene, settings: RenderSettings, camera: Camera | None = None, *
     variant = settings.variant if layers > 1 else Variant.TWO_PASS
     look_ahead = _looks_ahead(variant, settings, continuous=continuous)
     guard_band = _plan_guard_band(settings, variant, left_out)
-    lights, dark = plan_lights(scene, settings, camera, continuous=continuous)
+    view = camera and guarded(camera, settings, guard_band)
+    lights, dark = plan_lights(scene, settings, view, continuous=continuous)
     left_out += [LeftOut(name, reason) for name, reason in dark]
     lighting = plan_lighting_passes(scene, settings, lights, layers, left_out)
     direct = lighting[-1] if lighting else None
@@ -127,6 +128,14 @@ def plan(scene: Scene, settings: RenderSettings, camera: Camera | None = None, *
         _plan_composite(scene, settings, direct),
     ]
     return Plan(tuple(passes), tuple(left_out), layers, variant, channels, look_ahead, guard_band, lights)
+
+
+def guarded(camera: Camera, settings: RenderSettings, guard_band: int) -> Camera:
+    """A camera that sees `guard_band` pixels more on each side of the picture."""
+    if guard_band == 0:
+        return camera
+    x, y = guard_band / settings.width, guard_band / settings.height
+    return camera.cropped(-x, 1.0 + x, -y, 1.0 + y)
 
 
 def frames_before(settings: RenderSettings) -> int:
@@ -265,7 +274,7 @@ def _plan_composite(scene: Scene, settings: RenderSettings, direct: PlannedPass 
         defines |= {"SPECULAR"} if any(material.is_glossy for material in materials) else set[str]()
         rough = any(material.diffuse_roughness > 0.0 for material in materials)
         defines |= {"DIFFUSE_ROUGHNESS"} if rough else set[str]()
-        defines |= {"PHONG"} if settings.shading_model is ShadingModel.PHONG else set[str]()
+        defines |= {"PHONG"} if settings.shading_model is not ShadingModel.PHYSICAL else set[str]()
     defines |= {"ENVIRONMENT"} if scene.world.environment is not None else set[str]()
     defines |= {"SPLIT"} if direct and settings.channels & SPLIT_TARGETS.keys() else set[str]()
     reads = {"view_depth"}.union(*(_FILM_CHANNELS[channel] for channel in settings.channels & MEAN_CHANNELS))

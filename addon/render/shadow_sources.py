@@ -30,7 +30,7 @@ _CUBE_SHARE = 2
 _TEXELS_OF_HARD_EDGES, _TEXELS_OF_SOFT_EDGES = 4.0, 2.0
 """Texels per pixel: a shadow's edge is blurred by a texel (measured against Cycles: a pixel's width is too much)."""
 
-_WORLD_SHARE = 2
+_WORLD_SHARE = 4
 _WORLD_CASCADES = 1
 """Maps of the world's directions are coarser than a sun's: very many of them are averaged."""
 

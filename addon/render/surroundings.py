@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ..scene import Camera, Moment, RenderSettings, Sequence, Variant
 from ..scene.extrapolation import extrapolated
 from ..scene.history import is_cut
-from .plan import Plan
+from .plan import Plan, guarded
 
 
 @dataclass(frozen=True)
@@ -23,17 +23,13 @@ class Surroundings:
 def surroundings(current: Moment, sequence: Sequence, plan: Plan, settings: RenderSettings) -> Surroundings:
     """The frames around `current` that its plan makes use of. Those of `sequence` see the same picture without guard
     band."""
-    margin_x, margin_y = plan.guard_band / settings.width, plan.guard_band / settings.height
 
-    def guarded(moment: Moment) -> Moment:
-        camera = moment.camera
-        if plan.guard_band:
-            camera = camera.cropped(-margin_x, 1.0 + margin_x, -margin_y, 1.0 + margin_y)
-        return Moment(moment.scene, camera)
+    def widened(moment: Moment) -> Moment:
+        return Moment(moment.scene, guarded(moment.camera, settings, plan.guard_band))
 
-    now = guarded(current)
-    previous = guarded(sequence.previous) if sequence.previous else None
-    earlier = guarded(sequence.earlier) if sequence.earlier else previous
+    now = widened(current)
+    previous = widened(sequence.previous) if sequence.previous else None
+    earlier = widened(sequence.earlier) if sequence.earlier else previous
     history = ahead = None
     if not sequence.continuous and previous and earlier and not is_cut(previous, now):
         if plan.variant in (Variant.PREVIOUS, Variant.REPROJECT):
@@ -43,7 +39,7 @@ def surroundings(current: Moment, sequence: Sequence, plan: Plan, settings: Rend
     if plan.look_ahead and plan.variant is Variant.PREDICT:
         ahead = extrapolated(previous, now) if previous and not is_cut(previous, now) else now
     elif plan.look_ahead and sequence.continuous and sequence.following:
-        ahead = guarded(sequence.following)
+        ahead = widened(sequence.following)
     return Surroundings(now.camera, previous, history, ahead)
 
 

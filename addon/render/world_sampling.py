@@ -9,7 +9,7 @@ from ..scene.equirectangular import box_sums, coarsened, look_up, texel_coordina
 
 _LARGEST_TABLE = (256, 512)
 _COARSE = (512, 1024)  # to which larger maps are averaged first
-_UNIFORM_SHARE = 0.5
+_UNIFORM_SHARE = 0.25
 """Share of the samples that are drawn from everywhere alike: no direction's weight is more than what drawing all of
 them so would give, divided by this."""
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])

@@ -138,5 +138,5 @@ class RenderSettings:
     shadow_map_size: int = 2048
     shadow_memory: int = 512
     shadow_updates: int = 16
-    world_directions: int = 4
+    world_directions: int = 8
     light_threshold: float = 0.01

@@ -260,7 +260,7 @@ class DeepGBufferSettings(bpy.types.PropertyGroup):
         name="World Directions",
         description="From how many directions the world lights each sample, brighter ones being likelier: more give "
         "less noise under a sky, and take longer",
-        default=4,
+        default=8,
         min=1,
         soft_max=16,
         max=64,

@@ -44,6 +44,7 @@ struct Shading
     float precision_along_view; // m by which the position may be off
     int link_group;
     vec2 random;                // another in every pixel and sample
+    vec3 world_sharpness;       // what a smooth reflection shows of the world over what the world's samples show in it
 };
 
 #ifdef LIGHTS
@@ -124,14 +125,18 @@ Reflected lit_by_point(int index, Light light, LightPoint point, Shading shading
                      * light.diffuse_factor;
     result.glossy = vec3(0.0);
 #ifdef SPECULAR
-    if (any(greaterThan(shading.surface.specular_f0, vec3(0.0)))
-        && !(light.kind == LIGHT_WORLD && shading.surface.alpha < smallest_world_alpha)) {
+    if (any(greaterThan(shading.surface.specular_f0, vec3(0.0)))) {
         // Highlights take another point near the sampled one in every pixel: a shared one would show as a dot.
         LightSample reflected = sample_light(light, shading.position, scattered(light, point, shading.random));
         // Whatever is in between the sampled point is in between this one as well.
         vec3 arriving = weight * (reflected.weight / max(incident.weight, vec3(1e-37)));
-        result.glossy = specular_brdf_cosine(shading.surface, shading.normal, shading.view, reflected.direction)
-                        * arriving * light.specular_factor;
+        arriving *= light.specular_factor;
+        Surface surface = shading.surface;
+        if (light.kind == LIGHT_WORLD) {
+            surface.alpha = max(surface.alpha, smallest_world_alpha);
+            arriving *= shading.world_sharpness;
+        }
+        result.glossy = specular_brdf_cosine(surface, shading.normal, shading.view, reflected.direction) * arriving;
     }
 #endif
     return result;
@@ -162,7 +167,7 @@ void add_light(int index, Shading shading, inout Reflected sum)
 }
 
 /** What all lights cause. */
-Reflected lit(Shading shading)
+Reflected lit_by_lights(Shading shading)
 {
     Reflected sum = Reflected(vec3(0.0), vec3(0.0));
 #ifdef MANY_LIGHTS
@@ -180,23 +185,48 @@ Reflected lit(Shading shading)
 }
 #endif
 
-#ifdef WORLD
+#if defined(WORLD) && defined(PREVIEW)
 /** What the world causes where nothing is in between. */
 Reflected lit_by_world(Shading shading)
 {
-    Reflected result = Reflected(vec3(0.0), vec3(0.0));
-    result.glossy = environment_specular(reflect(-shading.view, shading.normal), shading.surface.alpha);
-#ifdef PREVIEW
-    result.diffuse = environment_irradiance(shading.normal) / PI;
-#endif
     float n_dot_v = clamp(dot(shading.normal, shading.view), 0.0, 1.0);
-    result.diffuse *= diffuse_directional_albedo(shading.surface, n_dot_v) * world_factors.x;
-    result.glossy *= shading.surface.specular_albedo * world_factors.y;
-#ifndef PREVIEW
-    // The world's sampled directions show in all but the smoothest reflections.
-    if (shading.surface.alpha >= smallest_world_alpha)
-        result.glossy = vec3(0.0);
-#endif
-    return result;
+    vec3 mirrored = reflect(-shading.view, shading.normal);
+    return Reflected(environment_irradiance(shading.normal) / PI
+                         * diffuse_directional_albedo(shading.surface, n_dot_v) * world_factors.x,
+                     environment_specular(mirrored, shading.surface.alpha) * shading.surface.specular_albedo
+                         * world_factors.y);
 }
 #endif
+
+/**
+ * What a reflection shows of the world over what the smoothest one shows that the world's samples resolve.
+ *
+ * By that one they tell what is in between; the ratio gives back what it blurs, and tends to 1 with more samples.
+ */
+vec3 world_sharpness(Shading shading)
+{
+#if defined(ENVIRONMENT) && !defined(PREVIEW)
+    if (shading.surface.alpha < smallest_world_alpha) {
+        vec3 mirrored = reflect(-shading.view, shading.normal);
+        return environment_specular(mirrored, shading.surface.alpha)
+               / max(environment_specular(mirrored, smallest_world_alpha), vec3(1e-20));
+    }
+#endif
+    return vec3(1.0);
+}
+
+/** What all of it causes. */
+Reflected lit(Shading shading)
+{
+    Reflected sum = Reflected(vec3(0.0), vec3(0.0));
+    shading.world_sharpness = world_sharpness(shading);
+#ifdef LIGHTS
+    sum = lit_by_lights(shading);
+#endif
+#if defined(WORLD) && defined(PREVIEW)
+    Reflected world = lit_by_world(shading);
+    sum.diffuse += world.diffuse;
+    sum.glossy += world.glossy;
+#endif
+    return sum;
+}

@@ -128,8 +128,9 @@ bool find_map(LightPoint point, vec3 origin, vec3 position, out ShadowMap map, o
         if (map.size == 0.0)
             continue;
         place = to_map(map, position);
-        // Behind a perspective map's light nothing is lit.
-        if (place.z > 0.0 && on_map(map, place.xy, 1.0))
+        // Behind a perspective map's light nothing is lit. What is aside of it, at the rim of a spot's cone, where a
+        // sphere's point is seen in a slightly other direction than that in which it is sampled, has its nearest texel.
+        if (place.z > 0.0 && (!map.orthographic || on_map(map, place.xy, 1.0)))
             return true;
     }
     return false;

@@ -48,14 +48,7 @@ void main()
         // Counted from the picture's corner, so that a guard band does not change the picture.
         uvec2 pixel = uvec2(ivec2(gl_FragCoord.xy) - guard_band);
         shading.random = fract(hash_to_unit(pixel) + pixel_shift);
-#ifdef LIGHTS
         reflected = lit(shading);
-#endif
-#ifdef WORLD
-        Reflected world = lit_by_world(shading);
-        reflected.diffuse += world.diffuse;
-        reflected.glossy += world.glossy;
-#endif
 #endif
     }
     write_radiance(emitted, reflected.diffuse, reflected.glossy, covered ? 1.0 : 0.0);

@@ -7,6 +7,7 @@
 #include "common/finite.glsl"
 #include "common/octahedral.glsl"
 #include "common/shared_exponent.glsl"
+#include "gbuffer/reversed_depth.glsl"
 #include "gbuffer/surface.glsl"
 #include "generated/GBufferUniforms.glsl"
 #include "generated/MaterialUniforms.glsl"
@@ -126,14 +127,6 @@ vec3 facing_normal(vec3 geometric)
 }
 #endif
 
-#ifdef FRAGMENT_DEPTH
-/** Depth 1 at the near plane, falling to 0: what a 0…1 clip space stores without this (`Camera.projection`). */
-float reversed_depth()
-{
-    return orthographic != 0 ? (clip_end - surface.view_depth) / (clip_end - clip_start) : clip_start / surface.view_depth;
-}
-#endif
-
 void main()
 {
     // Derivatives are taken before any fragment of a quad is discarded; what needs none can wait.
@@ -158,7 +151,7 @@ void main()
         discard;
 #endif
 #ifdef FRAGMENT_DEPTH
-    gl_FragDepth = reversed_depth();
+    gl_FragDepth = reversed_depth(surface.view_depth);
 #endif
     out_view_depth = surface.view_depth;
 #ifdef WRITE_NORMAL

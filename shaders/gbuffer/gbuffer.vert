@@ -120,15 +120,11 @@ void main()
     gl_Layer = layer;
 #endif
 #if defined(WRITE_NORMAL) || defined(EXIT)
-    // The cofactor matrix carries normals; its sign, unlike the inverse transpose's, does not depend on mirroring.
-    vec3 across = cross(pose.row_1.xyz, pose.row_2.xyz);
-    surface.handedness = dot(pose.row_0.xyz, across) < 0.0 ? -1.0 : 1.0;
+    surface.handedness = handedness(pose);
 #endif
 #ifdef WRITE_NORMAL
     surface.position = relative;
-    surface.normal = surface.handedness * vec3(dot(across, in_normal),
-                                               dot(cross(pose.row_2.xyz, pose.row_0.xyz), in_normal),
-                                               dot(cross(pose.row_0.xyz, pose.row_1.xyz), in_normal));
+    surface.normal = world_normal(pose, in_normal);
 #endif
 #ifdef TEXTURE
     surface.uv = in_uv;

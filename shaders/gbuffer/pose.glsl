@@ -15,6 +15,21 @@ struct Pose
     vec3 translation_low;
 };
 
+/** −1 where a pose mirrors, else 1. */
+float handedness(Pose pose)
+{
+    return dot(pose.row_0.xyz, cross(pose.row_1.xyz, pose.row_2.xyz)) < 0.0 ? -1.0 : 1.0;
+}
+
+/** Object-space normal to world axes, of any length, on the side of a triangle's front by its winding there. */
+vec3 world_normal(Pose pose, vec3 normal)
+{
+    // The cofactor matrix carries normals; its sign, unlike the inverse transpose's, does not depend on mirroring.
+    return handedness(pose) * vec3(dot(cross(pose.row_1.xyz, pose.row_2.xyz), normal),
+                                   dot(cross(pose.row_2.xyz, pose.row_0.xyz), normal),
+                                   dot(cross(pose.row_0.xyz, pose.row_1.xyz), normal));
+}
+
 /** Object-space position (m) to world axes with a camera's position, given as two float32 parts, as origin. */
 vec3 relative_to(vec3 camera_high, vec3 camera_low, Pose pose, vec3 position)
 {

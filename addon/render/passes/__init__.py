@@ -7,6 +7,7 @@ from .depth_tiles import DepthTilesPass
 from .direct import DirectPass
 from .exit import ExitPass
 from .gbuffer import GBufferPass
+from .gouraud import GouraudPass
 from .light_tiles import LightTilesPass
 from .oracle import OraclePass
 from .shadow_maps import ShadowMapsPass
@@ -19,6 +20,7 @@ PASSES: tuple[type[Pass], ...] = (
     ShadowMapsPass,
     LightTilesPass,
     DirectPass,
+    GouraudPass,
     CompositePass,
 )
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Direct light: outgoing radiance of every layer from lamps, emissive surfaces, the world and the surface itself."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 from math import sqrt
 
@@ -28,15 +28,24 @@ DIRECT_UNIFORMS = UniformBlock(
         ("shadow_jitter", "vec2"),  # texels from where a sample looks a shadow up
         ("pixel_shift", "vec2"),  # of every pixel's random numbers
         ("highlight_jitter", "float"),  # about half the distance between a light's samples, its half size being 1
-        ("smallest_world_alpha", "float"),  # GGX roughness below which the world's samples would show one by one
+        ("smallest_world_alpha", "float"),  # GGX roughness below which the world's samples show one by one
         ("light_count", "int"),
         ("light_tile_pages", "int"),
         ("layer", "int"),
     ),
 )
 
-_DIRECTIONS_PER_LOBE = 4.0
-"""The world's samples must fall that densely into a reflection's lobe, or the world is looked up instead."""
+LIGHT_SAMPLERS = ("light_table", "light_samples", *ENVIRONMENT_SAMPLERS)
+LIGHT_TABLE_SIZES = frozenset(
+    {
+        f"LIGHTS_PER_ROW {LIGHTS_PER_ROW}",
+        f"TEXELS_PER_LIGHT {TEXELS_PER_LIGHT}",
+        f"TEXELS_PER_SAMPLE {TEXELS_PER_SAMPLE}",
+    }
+)
+
+_DIRECTIONS_PER_LOBE = 16.0
+"""The world's samples must fall that densely into a reflection's lobe, or a wider one is taken for what they show."""
 
 
 class DirectPass:
@@ -50,13 +59,8 @@ class DirectPass:
 
     @classmethod
     def variants(cls) -> Iterator[ProgramSpec]:
-        """Every two of what a scene may have, alone, with everything else, and left out of everything."""
-        every = frozenset(DIRECT_DEFINES)
-        pairs = [frozenset(pair) for pair in combinations(DIRECT_DEFINES, 2)]
-        chosen = {every, frozenset({"EMISSION"}), *pairs, *(every - pair for pair in pairs)}
-        chosen |= {every - {name} for name in every} | {pair | {"SPLIT"} for pair in pairs}
-        programs = {direct_program_defines(defines, preview=preview) for defines in chosen for preview in (False, True)}
-        yield from (_program(defines) for defines in sorted(programs, key=sorted))
+        """What stands for every program that a plan can ask for."""
+        yield from (_program(defines) for defines in program_defines(DIRECT_DEFINES))
 
     def prepare(self, frame: Frame, planned: PlannedPass) -> None:
         """Nothing but uniforms, which `run` writes."""
@@ -72,50 +76,62 @@ class DirectPass:
             self._bind(frame, spec)
             targets = planned.writes if split else planned.writes[:1]
             frame.pool.framebuffer(tuple((target.name, layer) for target in targets)).use()
-            self._fullscreen.draw(spec, **self._uniforms(frame), layer=layer)
+            self._fullscreen.draw(spec, **light_uniforms(frame), layer=layer)
 
     def release(self) -> None:
         """Free the pass's buffers."""
         self._fullscreen.release()
 
     def _bind(self, frame: Frame, spec: ProgramSpec) -> None:
-        lighting = frame.lighting
-        if "LIGHTS" in spec.defines:
-            lighting.table().use(spec.samplers.index("light_table"))
-            lighting.upload_samples().use(spec.samplers.index("light_samples"))
+        bind_lights(frame, spec)
         if "SHADOWS" in spec.defines and frame.shadows is not None:
             if frame.shadows.atlas is not None:
                 frame.shadows.atlas.use(spec.samplers.index("shadow_atlas"))
             frame.shadows.table.use(spec.samplers.index("shadow_table"))
 
-        if ENVIRONMENT_DEFINE in spec.defines and frame.scene.world.environment is not None:
-            frame.environment.bind(frame.scene.world.environment, spec)
 
-    def _uniforms(self, frame: Frame) -> dict[str, object]:
-        world, lighting, settings = frame.scene.world, frame.lighting, frame.settings
-        shift = pixel_shift(frame.sample.index)
-        directions = max(lighting.plan.world_directions * settings.samples, 1)
-        return {
-            **environment_uniforms(world),
-            "world_factors": (float(world.seen_by_diffuse), float(world.seen_by_glossy)),
-            "shadow_jitter": (shift[0] - 0.5, shift[1] - 0.5),
-            "pixel_shift": shift,
-            "highlight_jitter": lighting.point_spacing,
-            # A lobe of roughness α is about 4πα² wide; so many of the directions, spread over 4π, fall into it.
-            "smallest_world_alpha": sqrt(_DIRECTIONS_PER_LOBE / directions),
-            "light_count": lighting.count,
-            "light_tile_pages": light_pages(lighting.plan.count) if lighting.plan.many else 0,
-        }
+def program_defines(names: Sequence[str]) -> list[frozenset[str]]:
+    """Of programs that may have these defines: every two alone, with everything else, and left out of everything."""
+    every = frozenset(names)
+    pairs = [frozenset(pair) for pair in combinations(names, 2)]
+    chosen = {every, frozenset({"EMISSION"}), *pairs, *(every - pair for pair in pairs)}
+    chosen |= {every - {name} for name in every} | {pair | {"SPLIT"} for pair in pairs}
+    programs = {direct_program_defines(defines, preview=preview) for defines in chosen for preview in (False, True)}
+    return sorted(programs, key=sorted)
+
+
+def bind_lights(frame: Frame, spec: ProgramSpec) -> None:
+    """Bind what the lights of this sample and the world are to the units of LIGHT_SAMPLERS."""
+    if "LIGHTS" in spec.defines:
+        frame.lighting.table().use(spec.samplers.index("light_table"))
+        frame.lighting.upload_samples().use(spec.samplers.index("light_samples"))
+    if ENVIRONMENT_DEFINE in spec.defines and frame.scene.world.environment is not None:
+        frame.environment.bind(frame.scene.world.environment, spec)
+
+
+def light_uniforms(frame: Frame) -> dict[str, object]:
+    """DIRECT_UNIFORMS of this sample, except the layer."""
+    world, lighting, settings = frame.scene.world, frame.lighting, frame.settings
+    shift = pixel_shift(frame.sample.index)
+    directions = max(lighting.plan.world_directions * settings.samples, 1)
+    return {
+        **environment_uniforms(world),
+        "world_factors": (float(world.seen_by_diffuse), float(world.seen_by_glossy)),
+        "shadow_jitter": (shift[0] - 0.5, shift[1] - 0.5),
+        "pixel_shift": shift,
+        "highlight_jitter": lighting.point_spacing,
+        # A lobe of roughness α is about 4πα² wide; so many of the directions, spread over 4π, fall into it.
+        "smallest_world_alpha": sqrt(_DIRECTIONS_PER_LOBE / directions),
+        "light_count": lighting.count,
+        "light_tile_pages": light_pages(lighting.plan.count) if lighting.plan.many else 0,
+    }
 
 
 def _program(defines: frozenset[str]) -> ProgramSpec:
-    sizes = {
-        f"LIGHTS_PER_ROW {LIGHTS_PER_ROW}",
-        f"TEXELS_PER_LIGHT {TEXELS_PER_LIGHT}",
-        f"TEXELS_PER_SAMPLE {TEXELS_PER_SAMPLE}",
+    sizes = LIGHT_TABLE_SIZES | {
         f"TEXELS_PER_MAP {TEXELS_PER_MAP}",
         f"TILE_SIZE {TILE_SIZE}",
         f"LIGHTS_PER_PAGE {LIGHTS_PER_PAGE}",
     }
-    samplers = ("light_table", "light_samples", "shadow_atlas", "shadow_table", *ENVIRONMENT_SAMPLERS)
+    samplers = (*LIGHT_SAMPLERS, "shadow_atlas", "shadow_table")
     return fullscreen_program("direct/direct.frag", DIRECT_UNIFORMS, defines | sizes, samplers=samplers)

@@ -21,7 +21,7 @@ CAMERA_UNIFORMS = UniformBlock(
     ),
 )
 
-_CHANNEL_SAMPLERS = {
+CHANNEL_SAMPLERS = {
     "gbuffer.view_depth": "view_depth_layers",
     "gbuffer.normal": "normal_layers",
     "gbuffer.base_color": "base_color_layers",
@@ -58,7 +58,7 @@ def fullscreen_program(
         fragment=fragment,
         defines=defines,
         blocks=(CAMERA_UNIFORMS, block),
-        samplers=(*_CHANNEL_SAMPLERS.values(), _GGX_ALBEDO, _LTC, *samplers),
+        samplers=(*CHANNEL_SAMPLERS.values(), _GGX_ALBEDO, _LTC, *samplers),
         generated=generated,
     )
 
@@ -78,7 +78,7 @@ class FullscreenDraw:
     def bind(self, frame: Frame, spec: ProgramSpec, planned: PlannedPass) -> None:
         """Bind the camera, the targets that the pass reads and the tables of the GGX BRDF."""
         for name in planned.reads:
-            frame.pool.texture(name).use(spec.samplers.index(_CHANNEL_SAMPLERS[name]))
+            frame.pool.texture(name).use(spec.samplers.index(CHANNEL_SAMPLERS[name]))
         self._device.ggx_albedo.use(spec.samplers.index(_GGX_ALBEDO))
         self._device.ltc.use(spec.samplers.index(_LTC))
         rotation = np.eye(4)
