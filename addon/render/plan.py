@@ -276,6 +276,8 @@ def _plan_composite(scene: Scene, settings: RenderSettings, direct: PlannedPass 
         defines |= {"DIFFUSE_ROUGHNESS"} if rough else set[str]()
         defines |= {"PHONG"} if settings.shading_model is not ShadingModel.PHYSICAL else set[str]()
     defines |= {"ENVIRONMENT"} if scene.world.environment is not None else set[str]()
+    if scene.world.sun_disc is not None and scene.world.seen_by_camera:
+        defines.add("SUN_DISC")
     defines |= {"SPLIT"} if direct and settings.channels & SPLIT_TARGETS.keys() else set[str]()
     reads = {"view_depth"}.union(*(_FILM_CHANNELS[channel] for channel in settings.channels & MEAN_CHANNELS))
     targets = [f"gbuffer.{name}" for name in sorted(reads)]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shadow maps on the GPU: one texture array for all, and what is kept in it from sample to sample and view to view."""
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
 
 import moderngl
@@ -68,11 +68,16 @@ class ShadowStore:
         Raises RenderError where memory does not suffice.
         """
         while (placed := self._place(wanted)) is None:
-            self._grow(sum(size * size for size in wanted.values()))
+            self._make_room(sum(size * size for size in wanted.values()))
         slots, fresh = placed
         self.drawn += len(fresh)
         self.kept += len(wanted) - len(fresh)
         return slots, fresh
+
+    def forget(self, keys: Iterable[Hashable]) -> None:
+        """These were placed, but not drawn."""
+        for key in keys:
+            self._drop(key)
 
     def target(self, slot: Slot) -> moderngl.Framebuffer:
         """The page of a slot with hardware depth, where only the slot can be drawn to."""
@@ -144,13 +149,17 @@ class ShadowStore:
     def _drop(self, key: Hashable) -> None:
         self._layout.release(self._entries.pop(key).slot)
 
-    def _grow(self, texels: int) -> None:
-        """More pages; what was drawn before is lost."""
+    def _make_room(self, texels: int) -> None:
+        """More pages, or where there are as many as may be, the same without gaps; what was drawn before is lost."""
         page = self._layout.page_size
-        wanted = max(2 * self._layout.pages, -(-texels // page**2) + 1, 1)
         if self._layout.pages >= self._limit:
-            raise RenderError("Shadow maps do not fit into their memory. Raise Shadow Memory or lower Shadow Map Size.")
-        pages = min(wanted, self._limit)
+            if not self._entries:
+                raise RenderError(
+                    "Shadow maps do not fit into their memory. Raise Shadow Memory or lower Shadow Map Size."
+                )
+            self.forget(tuple(self._entries))
+            return
+        pages = min(max(2 * self._layout.pages, -(-texels // page**2) + 1), self._limit)
         self.release()
         try:
             self._texture = self._device.context.texture_array((page, page, pages), 2, dtype="u4")

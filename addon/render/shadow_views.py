@@ -215,8 +215,8 @@ def _orthographic(receivers: Receivers, frame: Float64Array, casters: Float64Arr
     pose = np.eye(4)
     pose[:3, :3] = frame
     pose[:3, 3] = frame @ np.array([x, y, end + depth + step])
-    half = 0.5 * side
     size = _power_of_two(side / max(fineness.smallest, 1e-12), fineness.largest)
+    half = 0.5 * side * size / (size - 2.0)  # with the margin of `find_map`
     return ShadowMap(Camera(pose, (-half, half, -half, half), 0.0, depth + step, orthographic=True), size)
 
 

@@ -9,7 +9,7 @@ from .camera import Camera
 from .geometry import InstanceBatch, Mesh, SlotRange
 from .lights import ALL_GROUPS, LINK_GROUPS, AreaShape, Light, LightKind
 from .materials import BaseColorSource, EmissionSampling, Extension, Image, ImageTexture, Interpolation, Material
-from .scene import EnvironmentMap, Scene, Versions, World
+from .scene import EnvironmentMap, Scene, SunDisc, Versions, World
 from .sequence import Moment, Sequence
 from .settings import Channel, DebugView, Layering, RenderSettings, ShadingModel, Variant
 
@@ -39,6 +39,7 @@ __all__ = [
     "Sequence",
     "ShadingModel",
     "SlotRange",
+    "SunDisc",
     "Variant",
     "Versions",
     "World",

@@ -27,17 +27,40 @@ class EnvironmentMap:
 
 
 @dataclass(frozen=True)
+class SunDisc:
+    """The disc of a sky's sun as the camera sees it, added to the world's radiance; a `Light` of its own lights.
+
+    `direction`, `zenith`: unit vectors in world space, to the disc's centre and straight up from the horizon.
+    `half_angle` (rad): angular radius. `lowest`, `highest`: radiance, scene-linear RGB, W/(sr·m²), at the elevations
+    (rad) `lowest_elevation` and `highest_elevation`, interpolated by elevation. It is multiplied by
+    1 − limb_darkening · (1 − √(1 − t²)), t being 0 at the centre and 1 at the limb, and is 0 below `horizon` (rad).
+    """
+
+    direction: tuple[float, float, float]
+    zenith: tuple[float, float, float]
+    half_angle: float
+    lowest: Color
+    highest: Color
+    lowest_elevation: float
+    highest_elevation: float
+    horizon: float
+    limb_darkening: float
+
+
+@dataclass(frozen=True)
 class World:
     """Radiance that arrives from infinitely far away, scene-linear RGB, W/(sr·m²).
 
     `radiance`: of every direction, or the factor on `environment`, which is asked for the direction
     `environment_from_world` (3, 3), a rotation, times the one in world space; None for no rotation.
+    `sun_disc`: what the background shows of a sun besides.
     `seen_by_camera`, `seen_by_diffuse`, `seen_by_glossy`: who sees it.
     """
 
     radiance: Color = (0.0, 0.0, 0.0)
     environment: EnvironmentMap | None = None
     environment_from_world: Float64Array | None = None
+    sun_disc: SunDisc | None = None
     seen_by_camera: bool = True
     seen_by_diffuse: bool = True
     seen_by_glossy: bool = True

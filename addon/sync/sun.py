@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The disc of a physical sky's sun as a light."""
+"""The sun of a physical sky: its disc, and the light that it is."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..scene import Light, LightKind
+from ..scene import Light, LightKind, SunDisc
 from ..scene.arrays import Color, Float64Array
 from .lights import rigid_matrix
 from .sky import SMALLEST_SUN, Sky, single_scattering_sun
@@ -14,6 +14,7 @@ from .sky_multiple import multiple_scattering_sun
 _LIMB_DARKENING = 0.6
 _RINGS, _SPOKES = 32, 64
 _SEA_LEVEL = 6371e3  # m, the radius beyond which the Earth hides the sun
+_ZENITH = np.array([0.0, 0.0, 1.0])
 
 
 def sun_light(key: str, name: str, sky: Sky, size: float, color: Color, environment_from_world: Float64Array) -> Light:
@@ -24,34 +25,59 @@ def sun_light(key: str, name: str, sky: Sky, size: float, color: Color, environm
     size = max(size, SMALLEST_SUN)
     matrix = np.eye(4)
     matrix[:3, 2] = environment_from_world.T @ sky.sun_direction
-    matrix[:3, 1] = environment_from_world.T @ np.array([0.0, 0.0, 1.0])
+    matrix[:3, 1] = environment_from_world.T @ _ZENITH
     red, green, blue = sun_irradiance(sky, size) * color
     emission = float(red), float(green), float(blue)
     return Light(key, name, LightKind.SUN, rigid_matrix(matrix), emission, angle=size)
 
 
-def sun_irradiance(sky: Sky, size: float) -> Float64Array:
-    """(3,) scene-linear irradiance (W/m²) of the sun's disc on a surface that faces its centre.
+def sun_disc(sky: Sky, size: float, color: Color, environment_from_world: Float64Array) -> SunDisc:
+    """What the camera sees of the light that `sun_light` makes of the same arguments.
 
     The disc darkens towards its limb and brightens from its lowest to its highest point, as in Cycles, and ends at the
-    horizon of the point from which it is seen.
+    horizon of the point from which it is seen. Cycles shows it instead of the sky behind it, here it is added: the sky
+    is a thousandth of it or less.
     """
-    half = 0.5 * size
-    solid_angle = 2.0 * np.pi * (1.0 - np.cos(half))
+    half = 0.5 * max(size, SMALLEST_SUN)
+    lowest, highest = _edges(sky, half, 2.0 * np.pi * (1.0 - np.cos(half))) * color
+    setting = sky.before_5 and sky.sun_elevation <= half
+    return SunDisc(
+        direction=_triple(environment_from_world.T @ sky.sun_direction),
+        zenith=_triple(environment_from_world.T @ _ZENITH),
+        half_angle=half,
+        lowest=_triple(lowest),
+        highest=_triple(highest),
+        lowest_elevation=0.0 if setting else sky.sun_elevation - half,
+        highest_elevation=sky.sun_elevation + half,
+        horizon=_horizon(sky),
+        limb_darkening=_LIMB_DARKENING,
+    )
+
+
+def sun_irradiance(sky: Sky, size: float) -> Float64Array:
+    """(3,) scene-linear irradiance (W/m²) of the sun's disc on a surface that faces its centre."""
+    disc = sun_disc(sky, size, (1.0, 1.0, 1.0), np.eye(3))
     rings = (np.arange(_RINGS) + 0.5) / _RINGS
-    cosine = 1.0 - rings * (1.0 - np.cos(half))
+    cosine = 1.0 - rings * (1.0 - np.cos(disc.half_angle))
     angle = np.arccos(cosine)[:, None]
     around = (np.arange(_SPOKES) + 0.5) * (2.0 * np.pi / _SPOKES)
     sine = np.sin(sky.sun_elevation) * np.cos(angle) + np.cos(sky.sun_elevation) * np.sin(angle) * np.cos(around)
-    elevation = np.arcsin(np.clip(sine, -1.0, 1.0))
-    height = (elevation - sky.sun_elevation) / size + 0.5
-    if sky.before_5 and sky.sun_elevation <= half:
-        height = elevation / max(sky.sun_elevation + half, 1e-9)  # from the horizon, where the sun is setting
-    lowest, highest = _edges(sky, half, solid_angle)
-    radiance = lowest + (highest - lowest) * height[..., None]
-    limb = 1.0 - _LIMB_DARKENING * (1.0 - np.sqrt(np.maximum(1.0 - (angle / half) ** 2, 0.0)))
-    weight = limb * (elevation > _horizon(sky)) * cosine[:, None]
-    return np.mean(radiance * weight[..., None], axis=(0, 1)) * solid_angle
+    radiance = _shown(disc, angle, np.arcsin(np.clip(sine, -1.0, 1.0)))
+    solid_angle = 2.0 * np.pi * (1.0 - np.cos(disc.half_angle))
+    return np.mean(radiance * cosine[:, None, None], axis=(0, 1)) * solid_angle
+
+
+def _shown(disc: SunDisc, angle: Float64Array, elevation: Float64Array) -> Float64Array:
+    """(..., 3) radiance of a disc `angle` (rad) from its centre, at elevations (rad) that broadcast with it."""
+    height = (elevation - disc.lowest_elevation) / max(disc.highest_elevation - disc.lowest_elevation, 1e-9)
+    lowest, highest = np.array(disc.lowest), np.array(disc.highest)
+    limb = 1.0 - disc.limb_darkening * (1.0 - np.sqrt(np.maximum(1.0 - (angle / disc.half_angle) ** 2, 0.0)))
+    return (lowest + (highest - lowest) * height[..., None]) * (limb * (elevation > disc.horizon))[..., None]
+
+
+def _triple(values: Float64Array) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z
 
 
 def _edges(sky: Sky, half: float, solid_angle: float) -> Float64Array:

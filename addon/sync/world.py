@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..scene import EnvironmentMap, Light, World
+from ..scene import EnvironmentMap, Light, SunDisc, World
 from ..scene.arrays import Color, Float32Array, Float64Array
 from ..scene.equirectangular import texel_directions
 from ..scene.versions import new_version
@@ -17,7 +17,7 @@ from .materials import ImageTable, has_nodes
 from .materials.graph import find_output, find_source
 from .materials.operations import LARGEST
 from .sky import Sky
-from .sun import sun_light
+from .sun import sun_disc, sun_light
 from .world_fields import (
     LARGEST_SIZE,
     Constant,
@@ -85,7 +85,7 @@ class WorldTable:
             return replace(black, radiance=(red, green, blue)), ()
         evaluator = WorldEvaluator(f"World “{world.name}”", images)
         radiance = _radiance(world.node_tree, evaluator)
-        lights = _suns(radiance, world.name, black, evaluator)
+        lights, black = _suns(radiance, world.name, black, evaluator)
         if not casts_shadow:
             evaluator.tell("only its sun can be without shadows yet; its other light is blocked by what is in its way")
             lights = tuple(replace(light, casts_shadow=False) for light in lights)
@@ -164,10 +164,11 @@ def _pixels(shown: Field, frame: _Frame) -> Float32Array:
     return pixels
 
 
-def _suns(radiance: Field, name: str, black: World, evaluator: WorldEvaluator) -> tuple[Light, ...]:
-    """The suns of the skies in a world: lights, as far as the world is a sum of skies."""
+def _suns(radiance: Field, name: str, black: World, evaluator: WorldEvaluator) -> tuple[tuple[Light, ...], World]:
+    """The suns of the skies in a world, as far as it is a sum of skies: lights, and `black` with the first one's disc."""
     shares = {id(part): share for part, share in linear_shares(radiance)}
     lights: list[Light] = []
+    disc: SunDisc | None = None
     for part in in_order(radiance):
         if not (isinstance(part, SkyTexture) and isinstance(part.sky, Sky) and part.sun_size > 0.0):
             continue
@@ -175,10 +176,12 @@ def _suns(radiance: Field, name: str, black: World, evaluator: WorldEvaluator) -
         if share is None or rotation is None:
             evaluator.tell("the sun of a sky whose colour or vector is changed is not rendered yet; it is left out")
             continue
-        if black.seen_by_camera:
-            evaluator.tell("the sun's disc lights the scene but is not seen in the background yet")
         color = _limited(np.array(share) * part.sun_intensity)
+        if disc is None:
+            disc = sun_disc(part.sky, part.sun_size, color, rotation)
+        elif black.seen_by_camera:
+            evaluator.tell("only one sun's disc is seen in the background yet; the others light the scene unseen")
         light = sun_light(f"{_KEY}/sun{len(lights) or ''}", name, part.sky, part.sun_size, color, rotation)
         seen = {"diffuse_factor": float(black.seen_by_diffuse), "specular_factor": float(black.seen_by_glossy)}
         lights.append(replace(light, **seen))
-    return tuple(lights)
+    return tuple(lights), replace(black, sun_disc=disc)

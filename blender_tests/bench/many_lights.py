@@ -21,14 +21,16 @@ COUNTS = (1, 256)
 WARM, TIMED = 4, 12
 """Samples: while the first ones are drawn, programs are compiled and every lamp gets its first shadow maps."""
 
-POWER = 5.0
+SMALL, STRONGER = 1.0, 5.0
+"""Watts, as Blender means them: a candle's light, and five times as much, which is judged by no limit."""
+
 RADIUS = 0.03
 LIMIT = 3.0
 LIGHT_PASSES = ("depth_tiles", "light_tiles", "shadow_maps", "direct")
 
 
-def lamps(scene: Scene, count: int) -> tuple[Light, ...]:
-    """Lamps of 5 W and 3 cm all over the atrium, at most 6 m above its floor; the first `count` of them."""
+def lamps(scene: Scene, count: int, power: float) -> tuple[Light, ...]:
+    """Lamps of so many watts all over the atrium, at most 6 m above its floor; the first `count` of them."""
     generator = np.random.default_rng(0)
     boxes = [
         (corners @ matrix[:3, :3].T + matrix[:3, 3])
@@ -43,7 +45,7 @@ def lamps(scene: Scene, count: int) -> tuple[Light, ...]:
         matrix = np.eye(4)
         matrix[:2, 3] = middle[:2] + 0.8 * half[:2] * generator.uniform(-1.0, 1.0, 2)
         matrix[2, 3] = low[2] + generator.uniform(0.5, 6.0)
-        color = generator.uniform(0.5, 1.0, 3) * POWER / (4.0 * np.pi)
+        color = generator.uniform(0.5, 1.0, 3) * power / (4.0 * np.pi)
         emission = (float(color[0]), float(color[1]), float(color[2]))
         result.append(Light(f"lamp {index}", f"lamp {index}", LightKind.POINT, matrix, emission, radius=RADIUS))
     return tuple(result[:count])
@@ -53,18 +55,15 @@ def _corners(bounds: np.ndarray) -> np.ndarray:
     return np.array([[bounds[i, 0], bounds[j, 1], bounds[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
 
 
-def measure(device: Device) -> tuple[str, float]:
-    """The table, and how many times as long a sample takes with the most lamps as with one. Runs on the GL thread."""
-    with tempfile.TemporaryDirectory(prefix="deep_gbuffer_bench_") as folder:
-        scene = snapshot.load(snapshots(SPONZA, [1, 1], (WIDTH, HEIGHT), Path(folder))[0]).scene
+def times(device: Device, scene: Scene, power: float) -> dict[int, list[dict[str, float]]]:
+    """Milliseconds per pass of samples that take turns, by the number of lamps."""
     assert scene.camera is not None
     settings = RenderSettings(WIDTH, HEIGHT, samples=WARM + TIMED)
-    renderers: dict[int, Renderer] = {}
+    renderers = {count: Renderer(device) for count in COUNTS}
     passes: dict[int, list[dict[str, float]]] = {count: [] for count in COUNTS}
-    for count in COUNTS:
-        renderers[count] = Renderer(device)
-        lit = replace(scene, lights=lamps(scene, count), world=World())
-        renderers[count].begin(lit, scene.camera, settings)
+    for count, renderer in renderers.items():
+        lit = replace(scene, lights=lamps(scene, count, power), world=World())
+        renderer.begin(lit, scene.camera, settings)
     for index in range(WARM + TIMED):
         for count, renderer in renderers.items():
             renderer.render_sample()
@@ -72,22 +71,32 @@ def measure(device: Device) -> tuple[str, float]:
                 passes[count].append(dict(renderer.statistics().passes))
     for renderer in renderers.values():
         renderer.release()
-    rows, whole = [], {}
-    names = list(dict.fromkeys(name for count in COUNTS for entry in passes[count] for name in entry))
-    for count in COUNTS:
-        whole[count] = median(sum(entry.values()) for entry in passes[count])
-        light = median(sum(entry.get(name, 0.0) for name in LIGHT_PASSES) for entry in passes[count])
-        each = [f"{median(entry.get(name, 0.0) for entry in passes[count]):.1f}" for name in names]
-        rows.append([str(count), f"{whole[count]:.1f}", f"{light:.1f}", *each])
-    ratio = whole[COUNTS[-1]] / whole[COUNTS[0]]
-    text = table(["lamps", "sample", "of which light", *names], rows)
+    return passes
+
+
+def measure(device: Device) -> tuple[str, float]:
+    """The tables, and how many times as long a sample takes with many small lamps as with one. On the GL thread."""
+    with tempfile.TemporaryDirectory(prefix="deep_gbuffer_bench_") as folder:
+        scene = snapshot.load(snapshots(SPONZA, [1, 1], (WIDTH, HEIGHT), Path(folder))[0]).scene
+    text, ratios = "", {}
+    for power in (SMALL, STRONGER):
+        passes = times(device, scene, power)
+        names = list(dict.fromkeys(name for count in COUNTS for entry in passes[count] for name in entry))
+        whole = {count: median(sum(entry.values()) for entry in passes[count]) for count in COUNTS}
+        rows = []
+        for count in COUNTS:
+            light = median(sum(entry.get(name, 0.0) for name in LIGHT_PASSES) for entry in passes[count])
+            each = [f"{median(entry.get(name, 0.0) for entry in passes[count]):.1f}" for name in names]
+            rows.append([str(count), f"{whole[count]:.1f}", f"{light:.1f}", *each])
+        ratios[power] = whole[COUNTS[-1]] / whole[COUNTS[0]]
+        text += f"## Lamps of {power:g} W: {ratios[power]:.2f}× the time of one\n\n"
+        text += table(["lamps", "sample", "of which light", *names], rows) + "\n"
     text += (
-        f"\nMilliseconds, medians of {TIMED} samples that take turns. With {COUNTS[-1]} lamps a sample takes "
-        f"{ratio:.2f}× as long as with one (limit {LIMIT:g}×).\n\n"
-        f"`python3 build.py bench {NAME}`: Sponza without sun and sky at {WIDTH}×{HEIGHT}, lamps of {POWER:g} W and "
-        f"{100 * RADIUS:g} cm radius. Machine: {machine()}; {device.name}.\n"
+        f"Milliseconds, medians of {TIMED} samples that take turns; limit for lamps of {SMALL:g} W: {LIMIT:g}×.\n\n"
+        f"`python3 build.py bench {NAME}`: Sponza without sun and sky at {WIDTH}×{HEIGHT}, lamps of {100 * RADIUS:g} cm"
+        f" radius, light threshold as by default. Machine: {machine()}; {device.name}.\n"
     )
-    return text, ratio
+    return text, ratios[SMALL]
 
 
 def main(arguments: list[str]) -> int:

@@ -45,8 +45,20 @@ def sun(direction, angle=0.01):
     return Light(f"sun {direction}", "sun", LightKind.SUN, matrix, (10.0, 10.0, 10.0), angle=angle)
 
 
+LEAK = 1e-4
+"""Of what the light does without shadows, mean over the picture: less than one pixel of a thousand is half lit, or all
+are in light that grazes them."""
+
 CORNERS = [(0.2, 1.0, 0.8), (-1.0, 0.6, 0.1), (1.0, 1.0, -0.6)]
 """Directions in which a camera in the room looks."""
+
+
+def leaked(session, light, look, samples):
+    """Mean radiance in the closed room, as a share of a wall's that faces the light at 2 m in the open."""
+    scene = replace(closed_room(), lights=(light,))
+    view = session.show(scene, looking((-0.3, -0.5, 0.2), look), width=48, height=48, samples=samples)
+    facing_it = max(light.emission) / (1.0 if light.kind is LightKind.SUN else 4.0)
+    return view.channels[Channel.COMBINED][..., :3].mean() / (0.5 / np.pi * facing_it)
 
 
 @settings(max_examples=15)
@@ -57,10 +69,7 @@ CORNERS = [(0.2, 1.0, 0.8), (-1.0, 0.6, 0.1), (1.0, 1.0, -0.6)]
 )
 def test_no_sun_shines_into_a_closed_room(shared_session, azimuth, elevation, look):
     direction = (np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), -np.sin(elevation))
-    scene = replace(closed_room(), lights=(sun(direction),))
-    view = shared_session.show(scene, looking((-0.3, -0.5, 0.2), look), width=48, height=48, samples=4)
-    lit = view.channels[Channel.COMBINED][..., :3].max(axis=-1) > 0.0
-    assert not lit.any(), f"{lit.mean():.2%} of the pixels are lit"
+    assert leaked(shared_session, sun(direction), look, samples=4) <= LEAK
 
 
 @pytest.mark.parametrize("samples", [1, 8])
@@ -68,10 +77,7 @@ def test_no_sun_shines_into_a_closed_room(shared_session, azimuth, elevation, lo
 @pytest.mark.parametrize("position", [(0.0, 0.0, 3.0), (3.0, 2.5, 2.2), (-2.1, 0.3, 0.4)])
 def test_no_lamp_shines_into_a_closed_room(shared_session, position, look, samples):
     light = builders.light(position=position, emission=(50.0, 50.0, 50.0), radius=0.05)
-    scene = replace(closed_room(), lights=(light,))
-    view = shared_session.show(scene, looking((-0.3, -0.5, 0.2), look), width=48, height=48, samples=samples)
-    lit = view.channels[Channel.COMBINED][..., :3].max(axis=-1) > 0.0
-    assert not lit.any(), f"{lit.mean():.2%} of the pixels are lit"
+    assert leaked(shared_session, light, look, samples) <= LEAK
 
 
 @settings(max_examples=15)

@@ -171,7 +171,8 @@ def test_marked_surfaces_come_first_and_others_only_up_to_the_limit():
     materials = (glowing("auto", (100.0,) * 3), glowing("marked", emission_sampling=EmissionSampling.FRONT))
     quads = [builders.quad(f"q{index:02}", half=0.5) for index in range(2 * GREATEST_COUNT)]
     batches = [
-        builders.batch(quad.key, materials=("marked" if index % 4 == 0 else "auto",)) for index, quad in enumerate(quads)
+        builders.batch(quad.key, materials=("marked" if index % 4 == 0 else "auto",))
+        for index, quad in enumerate(quads)
     ]
     sampled, left = lights_of(*quads, materials=materials, batches=batches)
     marked = GREATEST_COUNT // 2

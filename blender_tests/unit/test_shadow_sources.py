@@ -102,7 +102,10 @@ def is_lit(light, offset, point, points):
     """(N,) whether a light's sample sends anything to points (N, 3), by its cone, its spread and the side it faces."""
     axis = -light.world_from_light[:3, 2]
     if light.kind is LightKind.SPOT:
-        return sampled_direction(light, offset, points) @ -axis > np.cos(0.5 * light.angle) + 1e-9
+        lit = sampled_direction(light, offset, points) @ -axis > np.cos(0.5 * light.angle) + 1e-9
+        # So near that its points are seen at right angles to its axis, a single map from one of them shows nothing.
+        distance = np.linalg.norm(points - light.world_from_light[:3, 3], axis=1)
+        return lit & (light.radius < distance * np.sin(0.25 * (pi - light.angle)))
     if light.kind is LightKind.AREA:
         away = points - point
         cosine = away @ axis / np.linalg.norm(away, axis=1)

@@ -205,7 +205,7 @@ Reflected lit_by_world(Shading shading)
  */
 vec3 world_sharpness(Shading shading)
 {
-#if defined(ENVIRONMENT) && !defined(PREVIEW)
+#if defined(WORLD) && defined(ENVIRONMENT) && !defined(PREVIEW)
     if (shading.surface.alpha < smallest_world_alpha) {
         vec3 mirrored = reflect(-shading.view, shading.normal);
         return environment_specular(mirrored, shading.surface.alpha)

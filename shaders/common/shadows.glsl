@@ -98,18 +98,22 @@ vec2 receiver_gradient(ShadowMap map, vec3 normal, float n_dot_l, float distance
 }
 
 /**
- * Whether a texel's caster is before a receiver at `point`, in map space.
+ * Whether a caster is before a receiver of this nearness, `offset` texels from where the caster is known.
  *
  * Only what is before the receiver by both planes hides it: the caster's, at the receiver's place, and the receiver's, at
- * the texel's centre. So neither a tilted surface nor a neighbouring facet shadows what it touches.
+ * the caster's. So neither a tilted surface nor a neighbouring facet shadows what it touches.
  */
-bool hides(ShadowMap map, ivec2 texel, vec3 point, vec2 gradient, float tolerance)
+bool hides(vec3 caster, vec2 offset, float nearness, vec2 gradient, float tolerance)
 {
-    vec3 caster = fetch_caster(map, texel);
-    vec2 offset = point.xy - (vec2(texel) + 0.5);
     float before = min(dot(caster.yz, offset), dot(gradient, offset));
     float allowance = tolerance + SUBPIXEL * (abs(caster.y) + abs(caster.z) + abs(gradient.x) + abs(gradient.y));
-    return caster.x > 0.0 && caster.x + before > point.z + allowance;
+    return caster.x > 0.0 && caster.x + before > nearness + allowance;
+}
+
+/** The same of the caster in a texel and a receiver at `point`, in map space. */
+bool texel_hides(ShadowMap map, ivec2 texel, vec3 point, vec2 gradient, float tolerance)
+{
+    return hides(fetch_caster(map, texel), point.xy - (vec2(texel) + 0.5), point.z, gradient, tolerance);
 }
 
 /** The map that a receiver is on, and its place there; false where no map shows it, so that light arrives. */
@@ -142,6 +146,32 @@ ivec2 texel_of(ShadowMap map, vec2 point)
     return ivec2(clamp(point, map.corner, map.corner + map.size - 1.0));
 }
 
+// Texels within which a caster must come to a receiver that it meets in a crease.
+const float CONTACT = 2.0;
+
+/**
+ * Whether the caster in texel `nearest` hides a receiver, or one in the four texels about it that it meets in a crease.
+ *
+ * Beside a crease the nearest texel may be beyond the other surface's edge: what covers the receiver is in the next one.
+ * A caster farther off does not count there, so that edges of ordinary shadows stay where they are.
+ */
+bool is_hidden(ShadowMap map, ivec2 nearest, vec3 point, vec2 gradient, float tolerance, float distance)
+{
+    float texel_depth = nearness_of(map, point.z, map.texel * distance);
+    ivec2 first = texel_of(map, point.xy - 0.5);
+    ivec2 last = texel_of(map, vec2(first) + 1.5);
+    bool hidden = false;
+    for (int index = 0; index < 4; ++index) {
+        ivec2 texel = ivec2(index % 2 == 0 ? first.x : last.x, index / 2 == 0 ? first.y : last.y);
+        vec2 offset = point.xy - (vec2(texel) + 0.5);
+        vec3 caster = fetch_caster(map, texel);
+        float before = caster.x + dot(caster.yz, offset) - point.z;
+        bool counts = texel == nearest || before < CONTACT * (texel_depth + abs(caster.y) + abs(caster.z));
+        hidden = hidden || (counts && hides(caster, offset, point.z, gradient, tolerance));
+    }
+    return hidden;
+}
+
 /** 1 where light from a sampled point (`origin`; of distant light unused) arrives, else 0. */
 float point_visibility(LightPoint point, vec3 origin, Receiver receiver, float n_dot_l)
 {
@@ -150,10 +180,11 @@ float point_visibility(LightPoint point, vec3 origin, Receiver receiver, float n
     if (!find_map(point, origin, receiver.position, map, place))
         return 1.0;
     // Samples of a light that always has the same map round to its texels elsewhere each: its edges become smooth.
-    ivec2 texel = texel_of(map, place.xy + (point.is_fixed ? shadow_jitter : vec2(0.0)));
+    ivec2 nearest = texel_of(map, place.xy + (point.is_fixed ? shadow_jitter : vec2(0.0)));
     float distance = map.orthographic ? 1.0 : length(receiver.position - origin);
     vec2 gradient = receiver_gradient(map, receiver.normal, n_dot_l, distance);
-    return hides(map, texel, place, gradient, receiver_tolerance(map, receiver, place.z, n_dot_l)) ? 0.0 : 1.0;
+    float tolerance = receiver_tolerance(map, receiver, place.z, n_dot_l);
+    return is_hidden(map, nearest, place, gradient, tolerance, distance) ? 0.0 : 1.0;
 }
 
 #ifdef PREVIEW
@@ -188,12 +219,14 @@ float soft_visibility(LightPoint point, vec3 origin, float radius, Receiver rece
     float widest = map.orthographic ? map.size * map.texel : place.z * (1.0 / NEAREST_BLOCKER - 1.0);
     float search = clamp(scale * widest, 1.0, WIDEST_SEARCH * map.size);
     float tolerance = receiver_tolerance(map, receiver, place.z, n_dot_l);
+    if (is_hidden(map, ivec2(-1), place, gradient, tolerance, distance)) // in a crease: no tap need be in it
+        return 0.0;
     float blockers = 0.0, nearness = 0.0;
     for (int tap = 0; tap < BLOCKER_TAPS; ++tap) {
         vec2 offset = search * disk_tap(tap, BLOCKER_TAPS, turn);
         ivec2 texel = texel_of(map, place.xy + offset);
         vec3 there = vec3(place.xy + offset, place.z + dot(gradient, offset));
-        if (hides(map, texel, there, gradient, tolerance)) {
+        if (texel_hides(map, texel, there, gradient, tolerance)) {
             blockers += 1.0;
             nearness += fetch_caster(map, texel).x;
         }
@@ -205,7 +238,7 @@ float soft_visibility(LightPoint point, vec3 origin, float radius, Receiver rece
     for (int tap = 0; tap < FILTER_TAPS; ++tap) {
         vec2 offset = penumbra * disk_tap(tap, FILTER_TAPS, turn);
         vec3 there = vec3(place.xy + offset, place.z + dot(gradient, offset));
-        lit += hides(map, texel_of(map, there.xy), there, gradient, tolerance) ? 0.0 : 1.0;
+        lit += texel_hides(map, texel_of(map, there.xy), there, gradient, tolerance) ? 0.0 : 1.0;
     }
     return lit / float(FILTER_TAPS);
 }

@@ -76,10 +76,32 @@ vec3 shown_color(ivec3 texel, float view_depth)
 #endif
 }
 
+#ifdef SUN_DISC
+/** Radiance, W/(sr·m²), of the sun's disc in a unit direction in world space, as SunDisc in scene/scene.py says. */
+vec3 sun_disc_radiance(vec3 direction)
+{
+    // By the chord, which is exact for small angles, unlike the cosine.
+    float angle = 2.0 * asin(min(0.5 * distance(direction, sun_direction.xyz), 1.0));
+    float elevation = asin(clamp(dot(direction, sun_zenith.xyz), -1.0, 1.0));
+    if (angle >= sun_direction.w || elevation <= sun_zenith.w)
+        return vec3(0.0);
+    float height = (elevation - sun_lowest.w) / max(sun_highest.w - sun_lowest.w, 1e-9);
+    float limb = 1.0 - sun_limb_darkening * (1.0 - sqrt(1.0 - (angle / sun_direction.w) * (angle / sun_direction.w)));
+    return mix(sun_lowest.rgb, sun_highest.rgb, height) * limb;
+}
+#endif
+
 /** What the camera sees of the world through a pixel. */
 vec3 background_radiance(vec2 pixel)
 {
-    return world_seen != 0 ? environment_radiance(-view_direction(pixel)) : vec3(0.0);
+    if (world_seen == 0)
+        return vec3(0.0);
+    vec3 direction = -view_direction(pixel);
+#ifdef SUN_DISC
+    return environment_radiance(direction) + sun_disc_radiance(direction);
+#else
+    return environment_radiance(direction);
+#endif
 }
 
 #if defined(FILM_DIFFUSE_COLOR) || defined(FILM_GLOSSY_COLOR)

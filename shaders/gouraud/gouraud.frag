@@ -32,12 +32,22 @@ in vec3 back_glossy;
 #endif
 #endif
 
+/**
+ * By how much (m) two programs may differ in the view depth of the same fragment: they round differently, and the
+ * rasteriser goes from the picture's corner to the fragment along the depth's slope. Takes derivatives.
+ */
+float rounding()
+{
+    vec2 slope = abs(vec2(dFdx(view_depth), dFdy(view_depth)));
+    return 4.0 * FLOAT_EPSILON * (view_depth + dot(slope, resolution));
+}
+
 void main()
 {
     ivec3 texel = ivec3(gl_FragCoord.xy, first_layer);
     float kept = texelFetch(view_depth_layers, texel, 0).r;
-    // As alike as variants of a program round; an empty texel is infinitely far.
-    if (!(abs(view_depth - kept) <= 4.0 * FLOAT_EPSILON * view_depth))
+    float tolerance = rounding();
+    if (isinf(kept) || !(abs(view_depth - kept) <= tolerance))
         discard;
 #ifdef ALPHA_TEST
     if (material_emission.a * textureLod(base_color_texture, uv, 0.0).a < alpha_threshold)

@@ -4,7 +4,7 @@
 from collections.abc import Iterator
 from itertools import combinations
 
-from ...scene import Channel, DebugView
+from ...scene import Channel, DebugView, SunDisc
 from ..device import Device
 from ..environment import ENVIRONMENT_DEFINE, ENVIRONMENT_UNIFORMS, MAP_SAMPLER, environment_uniforms
 from ..plan import SUM_CHANNELS, PlannedPass
@@ -13,10 +13,19 @@ from ..uniforms import UniformBlock
 from .base import Frame, subsets
 from .fullscreen import FullscreenDraw, fullscreen_program
 
+SUN_DISC_UNIFORMS = (
+    ("sun_direction", "vec4"),  # and its angular radius
+    ("sun_zenith", "vec4"),  # and the horizon's elevation
+    ("sun_lowest", "vec4"),  # radiance and its elevation
+    ("sun_highest", "vec4"),  # likewise
+    ("sun_limb_darkening", "float"),
+)
+
 COMPOSITE_UNIFORMS = UniformBlock(
     "CompositeUniforms",
     (
         *ENVIRONMENT_UNIFORMS,
+        *SUN_DISC_UNIFORMS,
         ("world_seen", "int"),  # whether the camera sees the world
         ("opaque", "int"),  # whether there is a background
         ("shown_layer", "int"),
@@ -36,7 +45,7 @@ class CompositePass:
     def variants(cls) -> Iterator[ProgramSpec]:
         """Radiance, black or a debug view; every pair of mean passes and all of them, with and without what they read.
 
-        Passes do not depend on one another nor on what the picture shows.
+        Passes do not depend on one another nor on what the picture shows; the sun's disc is only in the background.
         """
         shown = [{"DIRECT"}, set[str](), *({f"DEBUG_{view.value}"} for view in DebugView if view is not DebugView.NONE)]
         passes = [f"FILM_{channel.value}" for channel in SUM_CHANNELS if channel is not Channel.COMBINED]
@@ -45,6 +54,8 @@ class CompositePass:
         for film in films:
             for read in subsets(("SPECULAR", "DIFFUSE_ROUGHNESS", "PHONG", "SPLIT", "ENVIRONMENT")):
                 yield _program(read | film | {"DIRECT"})
+        for background in subsets(("ENVIRONMENT", "FILM_ENVIRONMENT")):
+            yield _program(background | {"DIRECT", "SUN_DISC"})
 
     def prepare(self, frame: Frame, planned: PlannedPass) -> None:
         """Nothing but uniforms, which `run` writes."""
@@ -61,6 +72,7 @@ class CompositePass:
         self._fullscreen.draw(
             spec,
             **environment_uniforms(world),
+            **_sun_disc_uniforms(world.sun_disc),
             world_seen=int(world.seen_by_camera),
             opaque=int(not debug and not frame.settings.transparent_film),
             shown_layer=min(frame.settings.debug_layer, frame.plan.layers - 1) if debug else 0,
@@ -69,6 +81,19 @@ class CompositePass:
     def release(self) -> None:
         """Free the pass's buffers."""
         self._fullscreen.release()
+
+
+def _sun_disc_uniforms(disc: SunDisc | None) -> dict[str, object]:
+    """Values of `SUN_DISC_UNIFORMS`; without a disc nothing reads them."""
+    if disc is None:
+        return dict.fromkeys((name for name, _ in SUN_DISC_UNIFORMS), 0.0)
+    return {
+        "sun_direction": (*disc.direction, disc.half_angle),
+        "sun_zenith": (*disc.zenith, disc.horizon),
+        "sun_lowest": (*disc.lowest, disc.lowest_elevation),
+        "sun_highest": (*disc.highest, disc.highest_elevation),
+        "sun_limb_darkening": disc.limb_darkening,
+    }
 
 
 def _program(defines: frozenset[str]) -> ProgramSpec:

@@ -105,7 +105,11 @@ class ShadowMapsPass:
         views = self._current_views(frame, casters, self._receivers)
         sizes = {view.key: view.shadow_map.size for maps in views.values() for view in maps if view is not None}
         slots, fresh = self._store.place(sizes)
-        self._draw_fresh(frame, draws, casters, views, slots, fresh)
+        try:
+            self._draw_fresh(frame, draws, casters, views, slots, fresh)
+        except BaseException:
+            self._store.forget(fresh)
+            raise
         self._write_table(frame, views, slots)
 
     def release(self) -> None:

@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import bpy
 
 from ...scene import (
     BaseColorSource,
@@ -26,9 +28,6 @@ from .missing import missing_attribute_messages
 from .nodes import NODE_READERS
 from .operations import as_value, unit
 from .surfaces import BLACK, Surface, evaluate_surface
-
-if TYPE_CHECKING:
-    import bpy
 
 __all__ = ["ImageTable", "MaterialTable", "evaluate_emission", "has_nodes", "missing_attribute_messages"]
 
@@ -161,7 +160,10 @@ def _warn_blended(surface: Surface, node: Node, evaluator: Evaluator) -> None:
 
 
 def _default() -> MaterialRecord:
-    material = Material(key=DEFAULT_MATERIAL, name="(empty slot)", version=new_version(), specular=0.0)
+    """What Cycles shows in an empty slot: a plain Principled BSDF since Blender 5.0, before that a diffuse one."""
+    material = Material(key=DEFAULT_MATERIAL, name="(empty slot)", version=new_version())
+    if bpy.app.version < (5, 0, 0):
+        material = replace(material, specular=0.0)
     return MaterialRecord(material, None, ())
 
 
