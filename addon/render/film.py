@@ -31,17 +31,20 @@ class Film:
     def __init__(self, device: Device) -> None:
         self._context = device.context
         self.samples = 0
+        self._summed = 0
 
-    def begin_sample(self, framebuffer: moderngl.Framebuffer) -> None:
-        """Bind the sums for adding one sample; the first one clears them."""
+    def begin_sample(self, framebuffer: moderngl.Framebuffer, *, over: bool = False) -> None:
+        """Bind the sums for adding one sample; the first one clears them, and any that starts `over`."""
         framebuffer.use()
-        if self.samples == 0:
+        if self.samples == 0 or over:
             framebuffer.clear()
+            self._summed = 0
+        self._summed += 1
         self._context.enable_only(moderngl.BLEND)
         self._context.blend_func = moderngl.ONE, moderngl.ONE
 
     def mean(self, pool: TexturePool, channel: Channel) -> Float32Array:
-        """The mean over the samples so far, (H, W, C) float32, row 0 at the bottom."""
+        """The mean over the samples since the sums were last cleared, (H, W, C) float32, row 0 at the bottom."""
         width, height = pool.picture_size
         sums = np.frombuffer(pool.read(film_target(channel).name), np.float32).reshape(height, width, 4)
-        return sums[..., : CHANNEL_COMPONENTS[channel]] / np.float32(max(self.samples, 1))
+        return sums[..., : CHANNEL_COMPONENTS[channel]] / np.float32(max(self._summed, 1))

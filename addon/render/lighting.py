@@ -30,7 +30,7 @@ class Lighting:
 
     After `begin_sample`: `points` (L, 3) float64, where in world space each lamp and surface is sampled, for a sun and
     the world the direction towards it; `numbers` (L,): equal ones are equal points. `preview`: whether this sample
-    shows lamps whole. Texels 0.w and 1.w of `samples` (L, 3, 4) are for the shadow maps' pass to fill.
+    shows lamps whole. `sample_count`: how many samples of the film do not. Texels 0.w and 1.w of `samples` (L, 3, 4) are for the shadow maps' pass to fill.
     """
 
     def __init__(self, device: Device) -> None:
@@ -41,6 +41,7 @@ class Lighting:
         self._sampled_world: World | None = None
         self.plan = LightPlan()
         self.preview = False
+        self.sample_count = 1
         self.points = np.zeros((0, 3))
         self.numbers = np.zeros(0, np.int64)
         self._reach = np.zeros(0)
@@ -63,12 +64,13 @@ class Lighting:
         self._extended = np.array(
             [_is_extended(light) for light in planned.lights] + [True] * len(planned.mesh_lights), np.bool_
         )
-        self._point_count = points_used(int(self._extended.sum()), settings.samples, settings.shadow_updates)
+        self.sample_count = max(settings.samples - planned.preview, 1)
+        self._point_count = points_used(int(self._extended.sum()), self.sample_count, settings.shadow_updates)
 
     def begin_sample(self, sample: int) -> None:
         """Choose the points of a sample."""
-        self._sample = sample
         self.preview = self.plan.preview and sample == 0
+        sample = self._sample = max(sample - self.plan.preview, 0)  # of those that sample the lights
         lamps = len(self.plan.lights)
         self.numbers = self._numbers(sample)
         cube = lattice_points(self.numbers, self._point_count, self._shifts)
@@ -155,7 +157,7 @@ class Lighting:
     def _world_rows(self, sample: int) -> Float32Array:
         count = self.plan.world_directions
         assert self._world_sampler is not None
-        total = count * self._settings.samples
+        total = count * self.sample_count
         numbers = sample * count + np.arange(count)
         directions, weights = self._world_sampler.directions(spiral_points(numbers, total, self._world_shift))
         self.points[-count:] = directions

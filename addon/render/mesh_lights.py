@@ -65,8 +65,8 @@ class MeshLight:
 def mesh_lights(scene: Scene, alpha_threshold: float) -> tuple[tuple[MeshLight, ...], tuple[MeshLight, ...]]:
     """The emissive surfaces worth sampling, strongest first, and those that are left to indirect light.
 
-    Those whose material is marked for it come whatever their share; of one batch's others only the largest are considered.
-    What has less alpha than `alpha_threshold` is not there.
+    Those whose material is marked for it come whatever their share; of a batch's others only the largest instances are
+    considered. What has less alpha than `alpha_threshold` is not there.
     """
     every = sorted(_candidates(scene, alpha_threshold), key=lambda light: (not light.marked, -light.power, light.key))
     total = sum(light.power for light in every)

@@ -51,11 +51,12 @@ class ShadowStore:
     def begin_view(self, page_size: int, memory: int, *, comes_round: bool) -> None:
         """A new view begins: pages of `page_size` texels a side, as many as fit into `memory` bytes, at least one.
 
-        `comes_round`: whether its samples will be drawn again, so that keeping their maps is worth memory.
+        `comes_round`: whether its samples will be drawn again, so that keeping their maps is worth memory. Otherwise it
+        begins with none: where a map lies decides how it is rounded, and its picture must not depend on earlier ones.
         """
         layers = self._device.context.info["GL_MAX_ARRAY_TEXTURE_LAYERS"]
         self._limit = min(max(memory // (TEXEL_BYTES * page_size**2), 1), layers)
-        if page_size != self._layout.page_size or self._layout.pages > self._limit:
+        if not comes_round or page_size != self._layout.page_size or self._layout.pages > self._limit:
             self.release()
             self._layout = AtlasLayout(page_size, 0)
         self._comes_round = comes_round

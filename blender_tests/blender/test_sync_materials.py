@@ -276,9 +276,11 @@ def test_texture_for_roughness_becomes_its_mean(empty_scene):
     assert_texts(texts, "“Rough”", "“Principled BSDF”", "Roughness")
 
 
-def test_empty_slot_is_blenders_grey(empty_scene):
+def test_empty_slot_is_blenders_default(empty_scene):
+    """Diffuse until 4.5, a Principled BSDF since 5.0; test_agreement_default_material compares it with Cycles'."""
     mirrored, _, texts = mirrored_material(None)
     assert mirrored.base_color == (0.8, 0.8, 0.8)
+    assert mirrored.specular == (F0_15 if bpy.app.version >= (5, 0, 0) else 0.0)
     assert texts == ()
 
 

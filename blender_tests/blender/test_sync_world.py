@@ -91,6 +91,7 @@ def test_a_changed_sky_is_another_map():
     texture.sun_intensity = 0.5  # the sun's alone
     dimmed, dimmed_lights, _ = read(table)
     assert dimmed.environment is first.environment
+    assert dimmed.sun_disc.highest == pytest.approx(tuple(0.5 * value for value in first.sun_disc.highest))
     assert dimmed_lights[0].emission == pytest.approx(tuple(0.5 * value for value in lights[0].emission))
     texture.sun_elevation = 0.7
     assert read(table)[0].environment.version != first.environment.version
@@ -109,24 +110,58 @@ def test_the_mirror_keeps_an_unchanged_scene_and_tells_changes():
     texture.sun_disc = False
     third = sync(mirror).scene
     assert third.lights == ()
-    assert third.versions.world == second.versions.world
+    assert third.world.sun_disc is None
+    assert third.versions.world != second.versions.world
+    assert third.world.environment is second.world.environment
 
 
 def test_the_sun_of_a_sky():
     tree, background, _ = sky_world(sun_rotation=0.4, sun_size=0.02)
     background.inputs["Strength"].default_value = 3.0
-    background_alone = read()[1][0].emission
+    alone, (light_alone,), _ = read()
     mix, other = add(tree, "MixShader"), add(tree, "Background")
     mix.inputs[0].default_value = 0.25
     output = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeOutputWorld")
     tree.links.new(background.outputs[0], mix.inputs[1])
     tree.links.new(other.outputs[0], mix.inputs[2])
     tree.links.new(mix.outputs[0], output.inputs["Surface"])
-    _, (sun,), texts = read()
+    world, (sun,), texts = read()
     assert sun.kind is LightKind.SUN
     assert sun.angle == pytest.approx(0.02)
-    assert sun.emission == pytest.approx(tuple(0.75 * value for value in background_alone))
-    assert_texts(texts, "“Sky”", "disc")
+    assert sun.emission == pytest.approx(tuple(0.75 * value for value in light_alone.emission))
+    assert world.sun_disc.half_angle == pytest.approx(0.01)
+    assert world.sun_disc.direction == pytest.approx(sun.world_from_light[:3, 2])
+    for radiance in ("lowest", "highest"):
+        expected = 0.75 * np.array(getattr(alone.sun_disc, radiance))
+        np.testing.assert_allclose(getattr(world.sun_disc, radiance), expected, rtol=1e-6)
+    assert texts == ()
+
+
+def test_the_sun_of_a_turned_sky():
+    tree, _, texture = sky_world(sun_rotation=0.4)
+    mapping = add(tree, "Mapping")
+    mapping.inputs["Rotation"].default_value = (0.0, 0.0, 0.3)
+    tree.links.new(add(tree, "TexCoord").outputs["Generated"], mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs[0], texture.inputs["Vector"])
+    disc = read()[0].sun_disc
+    expected = np.cos(0.6) * np.array([np.sin(0.7), np.cos(0.7)])  # both turn clockwise, seen from above
+    np.testing.assert_allclose(disc.direction, (*expected, np.sin(0.6)), atol=1e-6)
+    assert disc.zenith == pytest.approx((0.0, 0.0, 1.0))
+
+
+def test_of_several_suns_one_is_seen():
+    tree, background, _ = sky_world(sun_size=0.02)
+    other, sky = add(tree, "Background"), add(tree, "TexSky", sky_type=SCATTERING, sun_disc=True, sun_size=0.04)
+    total = add(tree, "AddShader")
+    tree.links.new(sky.outputs[0], other.inputs["Color"])
+    tree.links.new(background.outputs[0], total.inputs[0])
+    tree.links.new(other.outputs[0], total.inputs[1])
+    output = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeOutputWorld")
+    tree.links.new(total.outputs[0], output.inputs["Surface"])
+    world, lights, texts = read()
+    assert sorted(light.angle for light in lights) == pytest.approx([0.02, 0.04])
+    assert world.sun_disc.half_angle == pytest.approx(0.5 * lights[0].angle)
+    assert_texts(texts, "“Sky”", "only one sun")
 
 
 def test_a_sun_that_no_light_can_be_is_told():
@@ -135,8 +170,9 @@ def test_a_sun_that_no_light_can_be_is_told():
     gamma.inputs["Gamma"].default_value = 2.0
     tree.links.new(texture.outputs[0], gamma.inputs["Color"])
     tree.links.new(gamma.outputs[0], background.inputs["Color"])
-    _, lights, texts = read()
+    world, lights, texts = read()
     assert lights == ()
+    assert world.sun_disc is None
     assert_texts(texts, "sun", "left out")
 
 

@@ -136,10 +136,11 @@ def test_a_mesh_that_changes_shape_is_another_caster():
     assert not set(before.tolist()) & set(after.tolist())
 
 
-def leaf(texture=ImageTexture("leaf"), pixels=1, **arguments):
+def leaf(texture="leaf", pixels=1, **arguments):
     """A card whose alpha comes from an image."""
     image = Image("leaf", "leaf", pixels, np.zeros((2, 2, 4), np.uint8), srgb=True)
-    material = builders.material(source=BaseColorSource.TEXTURE, texture=texture, texture_alpha=True, **arguments)
+    source = {"source": BaseColorSource.TEXTURE, "texture": ImageTexture(texture), "texture_alpha": True}
+    material = builders.material(**source, **arguments)
     return builders.scene(builders.quad("card"), materials=(material,), images=(image, replace(image, key="other")))
 
 
@@ -151,7 +152,7 @@ def leaf(texture=ImageTexture("leaf"), pixels=1, **arguments):
         (leaf(), 0.25, True),
         (leaf(alpha=0.9), 0.5, True),
         (leaf(pixels=2), 0.5, True),
-        (leaf(ImageTexture("other")), 0.5, True),
+        (leaf("other"), 0.5, True),
         (replace(leaf(), materials={"white": builders.DIFFUSE}), 0.5, True),
     ],
 )

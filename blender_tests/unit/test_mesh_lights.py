@@ -100,7 +100,7 @@ def test_an_instance_is_where_it_is_placed_and_a_mirrored_one_keeps_its_front(se
     scale = abs(np.linalg.det(matrix[:3, :3])) ** (1.0 / 3.0)
     assert light.area == pytest.approx(4.0 * scale**2)
     np.testing.assert_allclose(light.center, matrix[:3, 3], atol=1e-6)
-    # The normals' matrix is the inverse transposed; of a rotation times a scale, mirrored or not, it has no sign of its own.
+    # Normals go by the inverse transposed, which mirrors them as little as it does the front.
     front = np.linalg.inv(matrix[:3, :3]).T @ (0.0, 0.0, 1.0)
     np.testing.assert_allclose(light.point(np.array([0.3, 0.4, 0.5]))[1], front / np.linalg.norm(front), atol=1e-9)
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 import pytest
 
 from addon.render import frames_before, plan
-from addon.scene import Channel, DebugView, EmissionSampling, LightKind, RenderSettings, Variant
+from addon.scene import Channel, DebugView, EmissionSampling, LightKind, RenderSettings, ShadingModel, SunDisc, Variant, World
 from blender_tests import builders
 
 SETTINGS = RenderSettings(64, 64, layers=4)
@@ -114,6 +114,14 @@ def test_a_debug_view_of_the_gbuffer_needs_no_light():
     assert planned.find("composite").defines == {"DEBUG_NORMAL"}
 
 
+def test_the_suns_disc_is_compiled_where_the_camera_sees_one():
+    disc = SunDisc((0.0, 0.0, 1.0), (0.0, 0.0, 1.0), 0.1, (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), 1.4, 1.6, 0.0, 0.6)
+    for seen in (True, False):
+        scene = replace(LIT, world=World(sun_disc=disc, seen_by_camera=seen))
+        assert ("SUN_DISC" in plan(scene, SETTINGS).find("composite").defines) == seen
+    assert "SUN_DISC" not in plan(LIT, SETTINGS).find("composite").defines
+
+
 def test_film_images_bring_their_channels():
     planned = plan(LIT, replace(SETTINGS, channels=frozenset({Channel.OBJECT_INDEX, Channel.NORMAL})))
     assert "gbuffer.object_index" in [target.name for target in planned.find("gbuffer").writes]
@@ -121,9 +129,31 @@ def test_film_images_bring_their_channels():
     assert [target.name for target in planned.find("composite").writes] == ["film.combined", "film.normal"]
 
 
+def test_gouraud_shading_takes_the_place_of_all_that_lights_pixels():
+    lights = (builders.light(),) * 17
+    scene = builders.scene(builders.quad("q"), lights=lights, materials=(builders.material(diffuse_roughness=0.5),))
+    settings = replace(SETTINGS, shading_model=ShadingModel.GOURAUD)
+    planned = plan(scene, settings)
+    assert names(planned) == ["gbuffer", "gouraud", "composite"]
+    shading = planned.find("gouraud")
+    assert shading.defines == {"SPHERE_LIGHTS", "PHONG"}
+    assert shading.reads == ("gbuffer.view_depth", "gbuffer.base_color", "gbuffer.material")
+    assert "gbuffer normal" in reasons(planned)
+    left_out = reasons(planned)
+    assert all("Gouraud" in left_out[name] for name in ("shadow_maps", "light_tiles", "direct"))
+    assert {"depth_tiles", "gouraud sun_lights"} <= left_out.keys()
+    shown = plan(scene, replace(settings, debug_view=DebugView.DIRECT, debug_layer=1))
+    assert shown.find("composite").defines == {"DEBUG_DIRECT"}
+    assert layers_written(shown)["direct.radiance"] == 2
+    assert reasons(plan(scene, SETTINGS))["gouraud"] == "shading is not Gouraud's"
+    dark = replace(scene, lights=())
+    assert names(plan(dark, settings)) == ["gbuffer", "composite"]
+
+
+@pytest.mark.parametrize("model", ShadingModel)
 @pytest.mark.parametrize("deep", [False, True])
-def test_what_is_read_is_written(deep):
-    planned = plan(LIT, replace(SETTINGS, deep_output=deep, channels=frozenset(Channel)))
+def test_what_is_read_is_written(deep, model):
+    planned = plan(LIT, replace(SETTINGS, deep_output=deep, channels=frozenset(Channel), shading_model=model))
     written = {target.name for target in planned.targets}
     assert all(set(item.reads) <= written for item in planned.passes)
 

@@ -48,7 +48,7 @@ def tiles_of(depths, size=TILE):
 
 
 def seen_points(camera, depths, offsets):
-    """World-space points (N, 3) that pixels show through places `offsets` (…, 2) from their centres, and depths (N,)."""
+    """World-space points (N, 3) that pixels show `offsets` (…, 2) beside their centres, and their view depths (N,)."""
     _, height, width = depths.shape
     _, y, x = np.nonzero(np.isfinite(depths))
     left, right, bottom, top = camera.window

@@ -116,8 +116,8 @@ def is_lit(light, offset, point, points):
 def within_cone(source, points, point):
     """Points (N, 3) in front of a lamp that has one perspective map, drawn to the square about its cone.
 
-    A spot with a radius lights some that are a little aside of that, as seen from its sampled point: it is asked whether
-    another direction is within its cone. They have the nearest texel.
+    A spot with a radius lights some that are a little aside of that, as seen from its sampled point, for its cone is
+    asked for another direction. They have the nearest texel.
     """
     frame = look_along(source.cone.axis)
     view = (points - point) @ frame

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 from dataclasses import replace
+from itertools import pairwise
 from math import inf, pi
 
 import numpy as np
@@ -191,11 +192,7 @@ def test_maps_stay_the_same_while_the_camera_moves_a_little():
     """Places snap: over 40 steps of 1 mm, seen from 5 m, at most the few that pass a step of the grid are new."""
     path = [replace(builders.camera(), world_from_camera=builders.translation(x=0.001 * k, z=5.0)) for k in range(40)]
     views = [identities(maps) for maps in views_along(path)]
-    changes = sum(
-        before != after
-        for one, other in zip(views, views[1:], strict=False)
-        for before, after in zip(one, other, strict=True)
-    )
+    changes = sum(before != after for one, other in pairwise(views) for before, after in zip(one, other, strict=True))
     assert changes <= 4
 
 

@@ -15,6 +15,7 @@ from addon.scene import (
     EnvironmentMap,
     Image,
     ImageTexture,
+    SunDisc,
     Versions,
     World,
     snapshot,
@@ -60,7 +61,9 @@ def test_a_scene_comes_back_as_it_was(tmp_path_factory, positions, name, pixels)
         lights=(builders.light(radius=0.1),),
         images=(Image("i", name, 3, pixels, srgb=True),),
     )
-    world = World((1.0, 2.0, 3.0), EnvironmentMap("e", name, 4, positions[None]), np.eye(3), seen_by_glossy=False)
+    disc = SunDisc((0.0, 0.6, 0.8), (0.0, 0.0, 1.0), 0.1, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), 0.6, 0.8, -0.1, 0.6)
+    environment = EnvironmentMap("e", name, 4, positions[None])
+    world = World((1.0, 2.0, 3.0), environment, np.eye(3), disc, seen_by_glossy=False)
     hidden = replace(scene.batches[0], seen_by_camera=False, casts_shadow=False, link_group=63)
     linked = replace(scene.lights[0], receiver_groups=ALL_GROUPS - 1, blocker_groups=1, shadow_texel=0.1)
     rough = replace(textured, diffuse_roughness=0.3, emission_sampling=EmissionSampling.FRONT)

@@ -79,7 +79,7 @@ LightPoint scattered(Light light, LightPoint point, vec2 random)
 
 #ifdef WHOLE_LAMPS
 /** A lamp as a whole. */
-Reflected lit_by_lamp(Light light, LightPoint point, Shading shading)
+Reflected lit_by_lamp(int index, Light light, LightPoint point, Shading shading)
 {
     Reflected result = Reflected(analytic_diffuse(light, shading.surface, shading.position, shading.normal, shading.view)
                                      * light.diffuse_factor,
@@ -87,6 +87,12 @@ Reflected lit_by_lamp(Light light, LightPoint point, Shading shading)
 #ifdef SPECULAR
     result.glossy = analytic_specular(light, shading.surface, shading.position, shading.normal, shading.view)
                     * light.specular_factor;
+#endif
+#ifdef MANY_LIGHTS
+    vec3 to_light = light.position - shading.position;
+    float share = light_reach_weight(index, dot(to_light, to_light));
+    result.diffuse *= share;
+    result.glossy *= share;
 #endif
 #ifdef SHADOWS
     if (point.shadow_count != 0) {
@@ -156,9 +162,9 @@ void add_light(int index, Shading shading, inout Reflected sum)
     if (light.kind == LIGHT_MESH)
         reflected = lit_by_point(index, light, point, shading);
     else
-        reflected = lit_by_lamp(light, point, shading);
+        reflected = lit_by_lamp(index, light, point, shading);
 #elif defined(WHOLE_LAMPS)
-    Reflected reflected = lit_by_lamp(light, point, shading);
+    Reflected reflected = lit_by_lamp(index, light, point, shading);
 #else
     Reflected reflected = lit_by_point(index, light, point, shading);
 #endif

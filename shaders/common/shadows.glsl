@@ -148,6 +148,14 @@ ivec2 texel_of(ShadowMap map, vec2 point)
 
 // Texels within which a caster must come to a receiver that it meets in a crease.
 const float CONTACT = 2.0;
+// Cosine of the least angle between the faces of a crease, Blender's for shading smooth by angle: 30 degrees.
+const float CREASE_COSINE = 0.866;
+
+/** Unit normal, in a map's own axes, of a plane whose nearness changes so per texel. */
+vec3 map_normal(ShadowMap map, float nearness, vec2 gradient)
+{
+    return normalize(vec3(-gradient / slope_unit(map.orthographic, nearness, map.texel), 1.0));
+}
 
 /**
  * Whether the caster in texel `nearest` hides a receiver, or one in the four texels about it that it meets in a crease.
@@ -160,14 +168,16 @@ bool is_hidden(ShadowMap map, ivec2 nearest, vec3 point, vec2 gradient, float to
     float texel_depth = nearness_of(map, point.z, map.texel * distance);
     ivec2 first = texel_of(map, point.xy - 0.5);
     ivec2 last = texel_of(map, vec2(first) + 1.5);
+    vec3 normal = map_normal(map, point.z, gradient);
     bool hidden = false;
     for (int index = 0; index < 4; ++index) {
         ivec2 texel = ivec2(index % 2 == 0 ? first.x : last.x, index / 2 == 0 ? first.y : last.y);
         vec2 offset = point.xy - (vec2(texel) + 0.5);
         vec3 caster = fetch_caster(map, texel);
         float before = caster.x + dot(caster.yz, offset) - point.z;
-        bool counts = texel == nearest || before < CONTACT * (texel_depth + abs(caster.y) + abs(caster.z));
-        hidden = hidden || (counts && hides(caster, offset, point.z, gradient, tolerance));
+        bool meets = before < CONTACT * (texel_depth + abs(caster.y) + abs(caster.z))
+                     && dot(map_normal(map, caster.x, caster.yz), normal) < CREASE_COSINE;
+        hidden = hidden || ((texel == nearest || meets) && hides(caster, offset, point.z, gradient, tolerance));
     }
     return hidden;
 }

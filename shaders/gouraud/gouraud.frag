@@ -64,9 +64,10 @@ void main()
     vec4 base_color = texelFetch(base_color_layers, texel, 0);
     vec4 material = texelFetch(material_layers, texel, 0);
     Surface surface = make_surface(base_color.rgb, base_color.a, material.r, material.g, material.b, 1.0);
-    diffuse = surface.diffuse_albedo * (gl_FrontFacing ? front_diffuse : back_diffuse);
+    // Blends of nothing may round to less.
+    diffuse = surface.diffuse_albedo * max(gl_FrontFacing ? front_diffuse : back_diffuse, 0.0);
 #ifdef SPECULAR
-    glossy = surface.specular_f0 * (gl_FrontFacing ? front_glossy : back_glossy);
+    glossy = surface.specular_f0 * max(gl_FrontFacing ? front_glossy : back_glossy, 0.0);
 #endif
 #endif
     write_radiance(emitted, diffuse, glossy, 1.0);

@@ -63,7 +63,10 @@ class CompositePass:
     def run(self, frame: Frame, planned: PlannedPass) -> None:
         """Add one sample to the film."""
         spec = _program(planned.defines)
-        frame.film.begin_sample(frame.pool.framebuffer(tuple((target.name, 0) for target in planned.writes)))
+        # A preview is only shown until there is something better: the world shines through walls in it.
+        over = frame.lighting.plan.preview and frame.sample.index == 1
+        framebuffer = frame.pool.framebuffer(tuple((target.name, 0) for target in planned.writes))
+        frame.film.begin_sample(framebuffer, over=over)
         self._fullscreen.bind(frame, spec, planned)
         debug = frame.settings.debug_view is not DebugView.NONE
         world = frame.scene.world

@@ -111,9 +111,9 @@ def bind_lights(frame: Frame, spec: ProgramSpec) -> None:
 
 def light_uniforms(frame: Frame) -> dict[str, object]:
     """DIRECT_UNIFORMS of this sample, except the layer."""
-    world, lighting, settings = frame.scene.world, frame.lighting, frame.settings
+    world, lighting = frame.scene.world, frame.lighting
     shift = pixel_shift(frame.sample.index)
-    directions = max(lighting.plan.world_directions * settings.samples, 1)
+    directions = max(lighting.plan.world_directions * lighting.sample_count, 1)
     return {
         **environment_uniforms(world),
         "world_factors": (float(world.seen_by_diffuse), float(world.seen_by_glossy)),

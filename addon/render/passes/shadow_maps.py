@@ -47,9 +47,6 @@ SHADOW_MAPS_UNIFORMS = UniformBlock(
 _PIERCED = "ALPHA_TEST"
 _VIEW_BINDING, _MATERIAL_BINDING = 0, 1
 
-_JITTER_MARGIN = 2.0
-"""Pixels by which sub-pixel jitter may move what is seen."""
-
 
 @dataclass(frozen=True)
 class _View:
@@ -97,7 +94,8 @@ class ShadowMapsPass:
         casters = self._casters.of(draws)
         if self._receivers is None:
             tiles = read_target(frame.pool, DEPTH_TILES_TARGET)
-            self._receivers = visible_receivers(tiles, TILE_SIZE, frame.view, frame.pool.size, _JITTER_MARGIN)
+            jitter = frame.settings.filter_radius
+            self._receivers = visible_receivers(tiles, TILE_SIZE, frame.view, frame.pool.size, jitter)
             self._sources = shadow_sources(frame.lighting.plan)
             self._views = {}
             self._rows = {}
