@@ -44,7 +44,7 @@ class CasterList:
     def of(self, draws: SceneDraws) -> Casters:
         """The casters among a scene's draws."""
         if self._scene is not draws:
-            casting = [draw for draw in draws.draws if draw.batch.casts_shadow and draw.batch.count]
+            casting = [draw for draw in draws.draws if draw.batch.casts_shadow]
             used = {self._identity(draws, draw): None for draw in casting}
             held = self._numbers
             self._numbers = {identity: held[identity] if identity in held else next(self._count) for identity in used}

@@ -97,7 +97,8 @@ SHADING_ITEMS = [
     (
         ShadingModel.GOURAUD.value,
         "Gouraud",
-        "A preview: as Phong, but for each vertex and blended in between; highlights show the mesh's triangles",
+        "A preview: as Phong, but for each vertex and blended in between; without shadows, and highlights show the "
+        "mesh's triangles",
     ),
 ]
 SHADOW_MAP_SIZE_ITEMS = [

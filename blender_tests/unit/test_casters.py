@@ -175,10 +175,7 @@ def test_each_slot_is_a_caster_of_its_own(unseen):
     np.testing.assert_array_equal(after, np.delete(before, unseen))
 
 
-def test_a_batch_without_instances_casts_nothing():
-    batches = [builders.batch("box", np.zeros((0, 4, 4)), key="none"), builders.batch("box")]
-    casters = CasterList().of(draws_of(builders.scene(builders.box("box"), batches=batches)))
-    assert [draw.batch.key for draw in casters.draws] == ["box"]
-    empty = CasterList().of(draws_of(builders.scene()))
-    assert empty.bounds.shape == (0, 2, 3)
-    assert empty.seen(builders.camera(), ALL_GROUPS).tolist() == []
+def test_a_scene_without_casters():
+    casters = CasterList().of(draws_of(builders.scene()))
+    assert casters.bounds.shape == (0, 2, 3)
+    assert casters.seen(builders.camera(), ALL_GROUPS).tolist() == []

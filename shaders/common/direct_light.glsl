@@ -44,7 +44,8 @@ struct Shading
     float precision_along_view; // m by which the position may be off
     int link_group;
     vec2 random;                // another in every pixel and sample
-    vec3 world_sharpness;       // what a smooth reflection shows of the world over what the world's samples show in it
+    Surface world_surface;      // as rough as the world's samples need it
+    vec3 world_sharpness;       // what the surface reflects of the world over what that one does
 };
 
 #ifdef LIGHTS
@@ -137,12 +138,10 @@ Reflected lit_by_point(int index, Light light, LightPoint point, Shading shading
         // Whatever is in between the sampled point is in between this one as well.
         vec3 arriving = weight * (reflected.weight / max(incident.weight, vec3(1e-37)));
         arriving *= light.specular_factor;
-        Surface surface = shading.surface;
-        if (light.kind == LIGHT_WORLD) {
-            surface.alpha = max(surface.alpha, smallest_world_alpha);
-            arriving *= shading.world_sharpness;
-        }
-        result.glossy = specular_brdf_cosine(surface, shading.normal, shading.view, reflected.direction) * arriving;
+        bool world = light.kind == LIGHT_WORLD;
+        result.glossy = specular_brdf_cosine(world ? shading.world_surface : shading.surface, shading.normal,
+                                             shading.view, reflected.direction)
+                        * arriving * (world ? shading.world_sharpness : vec3(1.0));
     }
 #endif
     return result;
@@ -204,21 +203,35 @@ Reflected lit_by_world(Shading shading)
 }
 #endif
 
+/** Roughness of a surface for the world's samples, which fall too far apart for the reflections of smoother ones. */
+float world_roughness(float roughness)
+{
+#ifdef WORLD_LIGHTS
+    return max(roughness, sqrt(smallest_world_alpha));
+#else
+    return roughness;
+#endif
+}
+
 /**
- * What a reflection shows of the world over what the smoothest one shows that the world's samples resolve.
+ * What a surface reflects of the world where nothing is in between, over what the rougher one does.
  *
- * By that one they tell what is in between; the ratio gives back what it blurs, and tends to 1 with more samples.
+ * By that one the samples tell what is in between; the ratio gives back what it blurs, and tends to 1 with more samples.
  */
 vec3 world_sharpness(Shading shading)
 {
-#if defined(WORLD) && defined(ENVIRONMENT) && !defined(PREVIEW)
-    if (shading.surface.alpha < smallest_world_alpha) {
+    vec3 ratio = vec3(1.0);
+#ifdef WORLD_LIGHTS
+    if (shading.surface.alpha < shading.world_surface.alpha) {
+        ratio = shading.surface.specular_albedo / max(shading.world_surface.specular_albedo, vec3(1e-6));
+#if defined(WORLD) && defined(ENVIRONMENT)
         vec3 mirrored = reflect(-shading.view, shading.normal);
-        return environment_specular(mirrored, shading.surface.alpha)
-               / max(environment_specular(mirrored, smallest_world_alpha), vec3(1e-20));
+        ratio *= environment_specular(mirrored, shading.surface.alpha)
+                 / max(environment_specular(mirrored, shading.world_surface.alpha), vec3(1e-20));
+#endif
     }
 #endif
-    return vec3(1.0);
+    return ratio;
 }
 
 /** What all of it causes. */

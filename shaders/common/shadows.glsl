@@ -8,7 +8,7 @@ uniform usampler2DArray shadow_atlas;
 uniform sampler2D shadow_table; // six texels a map, see render/shadow_table.py
 
 // Planes of casters and receivers are known to this part of a texel or pixel: vertices are snapped to such a grid.
-const float SUBPIXEL = 1.0 / 128.0;
+const float SUBPIXEL = 1.0 / 256.0;
 // Rounding of positions that were computed in a few steps.
 const float POSITION_EPSILON = 4.0 * FLOAT_EPSILON;
 

@@ -20,7 +20,7 @@ uniform sampler2DArray emission_layers;
 #endif
 
 // Surfaces are where they are drawn to this part of a pixel: vertices are snapped to such a grid.
-const float SURFACE_PRECISION = 1.0 / 128.0;
+const float SURFACE_PRECISION = 1.0 / 256.0;
 
 void main()
 {
@@ -42,6 +42,8 @@ void main()
         float n_dot_v = clamp(dot(shading.normal, shading.view), 0.0, 1.0);
         shading.surface =
             make_surface(base_color.rgb, base_color.a, material.r, material.g, material.b, n_dot_v);
+        shading.world_surface = make_surface(base_color.rgb, base_color.a, material.r, world_roughness(material.g),
+                                             material.b, n_dot_v);
         shading.position = relative_position(gl_FragCoord.xy, view_depth);
         shading.precision_along_view = SURFACE_PRECISION * pixel_width(view_depth) / max(n_dot_v, 0.02);
         shading.link_group = int(255.0 * material.a + 0.5);

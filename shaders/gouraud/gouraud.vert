@@ -37,6 +37,7 @@ Shading vertex_shading(vec3 position, vec3 normal, vec3 view)
     Shading shading;
     shading.surface = make_surface(vec3(1.0), 1.0, 1.0, material_surface.y, 0.0, 1.0);
     shading.surface.diffuse_albedo = vec3(1.0);
+    shading.world_surface = make_surface(vec3(1.0), 1.0, 1.0, world_roughness(material_surface.y), 0.0, 1.0);
     shading.position = position;
     shading.normal = normal;
     shading.view = view;
