@@ -18,8 +18,9 @@ SIZE = (32, 24)
 DEEP = {"width": SIZE[0], "height": SIZE[1], "deep_output": True, "exit_surfaces": True}
 COLORS = {"red": (1.0, 0.0, 0.0), "green": (0.0, 1.0, 0.0), "blue": (0.0, 0.0, 1.0)}
 MATERIALS = tuple(builders.material(key, base_color=color) for key, color in COLORS.items())
-# A normal of 16 bits per octahedral component is off by less than 2⁻¹³ rad.
-SAME_DIRECTION = 1.0 - 2.0**-26
+# A normal of 8 bits per octahedral component is off by less than 2⁻⁵ rad.
+NORMAL_STEP = 2.0**-5
+SAME_DIRECTION = 1.0 - 0.5 * NORMAL_STEP**2
 every_variant = pytest.mark.parametrize("variant", list(Variant))
 few_renders = settings(
     max_examples=12, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
@@ -70,7 +71,7 @@ def test_exits_equal_ray_caster(shared_session, subpixel_bits, case, variant, mi
         excess = np.abs(image.exit_depth[checked] - expected[checked]) - truth.tolerance[layer][checked]
         assert excess.max(initial=0.0) <= 0.0, f"layer {layer}: depth off at {np.argwhere(checked)[excess.argmax()]}"
         cosine = np.abs((image.exit_normal[checked] * truth.normal[layer][checked]).sum(axis=-1))
-        assert cosine.min(initial=1.0) > 0.999
+        assert cosine.min(initial=1.0) > SAME_DIRECTION
         np.testing.assert_array_equal(image.exit_albedo[checked], color_of(truth.owner[layer][checked]))
         nothing = ~np.isfinite(image.exit_depth)
         assert not image.exit_normal[nothing].any()
@@ -111,7 +112,7 @@ def test_exits_are_found_before_the_separation_is_applied(render, variant, separ
     np.testing.assert_allclose([image.exit_depth[13, 14] for image in images], exits, rtol=1e-6)
     for image in images:
         found = np.isfinite(image.exit_depth)
-        assert (image.exit_normal[found][:, 2] > -1e-4).all(), "exit normals face the viewer"
+        assert (image.exit_normal[found][:, 2] > -NORMAL_STEP).all(), "exit normals face the viewer"
         length = np.linalg.norm(image.exit_normal[found], axis=-1)
         np.testing.assert_allclose(length, 1.0, atol=1e-6)
 

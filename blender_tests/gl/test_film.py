@@ -93,11 +93,11 @@ def test_debug_views_show_their_channel_of_their_layer(render, view, layer):
         np.testing.assert_allclose(shown[:3], expected[view], atol=2e-3)
 
 
-def test_light_samples_converge_from_the_centre(render):
-    """The mean over samples approaches the integral: 64 samples are nearer to 1024 than one is."""
+def test_light_samples_converge(render):
+    """A close light's samples approach the closed form: 64 are nearer to 1024 than four are."""
     light = builders.light(LightKind.AREA, (0.4, 0.2, 0.6), (5, 5, 5), size=(1.5, 1.5))
     scene = builders.scene(builders.quad("q"), lights=(light,))
-    means = [render(scene, builders.camera(), samples=n).channels[Channel.COMBINED] for n in (1, 64, 1024)]
+    means = [render(scene, builders.camera(), samples=n).channels[Channel.COMBINED] for n in (4, 64, 1024)]
     assert np.abs(means[1] - means[2]).max() < 0.05 * np.abs(means[0] - means[2]).max()
 
 

@@ -45,9 +45,10 @@ def sun(direction, angle=0.01):
     return Light(f"sun {direction}", "sun", LightKind.SUN, matrix, (10.0, 10.0, 10.0), angle=angle)
 
 
-LEAK = 1e-4
-"""Of what the light does without shadows, mean over the picture: less than one pixel of a thousand is half lit, or all
-are in light that grazes them."""
+SIDE = 48
+LEAK = 1.0 / SIDE**2
+"""Of what the light does without shadows, mean over the picture: one pixel of it, whose surface is within 1/256 of a
+pixel of a crease, so that it may as well be outside."""
 
 CORNERS = [(0.2, 1.0, 0.8), (-1.0, 0.6, 0.1), (1.0, 1.0, -0.6)]
 """Directions in which a camera in the room looks."""
@@ -56,7 +57,7 @@ CORNERS = [(0.2, 1.0, 0.8), (-1.0, 0.6, 0.1), (1.0, 1.0, -0.6)]
 def leaked(session, light, look, samples):
     """Mean radiance in the closed room, as a share of a wall's that faces the light at 2 m in the open."""
     scene = replace(closed_room(), lights=(light,))
-    view = session.show(scene, looking((-0.3, -0.5, 0.2), look), width=48, height=48, samples=samples)
+    view = session.show(scene, looking((-0.3, -0.5, 0.2), look), width=SIDE, height=SIDE, samples=samples)
     facing_it = max(light.emission) / (1.0 if light.kind is LightKind.SUN else 4.0)
     return view.channels[Channel.COMBINED][..., :3].mean() / (0.5 / np.pi * facing_it)
 

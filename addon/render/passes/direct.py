@@ -44,7 +44,7 @@ LIGHT_TABLE_SIZES = frozenset(
     }
 )
 
-_DIRECTIONS_PER_LOBE = 16.0
+_DIRECTIONS_PER_LOBE = 8.0
 """The world's samples must fall that densely into a reflection's lobe, or a wider one is taken for what they show."""
 
 
