@@ -86,6 +86,7 @@ class Lighting:
             self.points[index] = point
             self.samples[index, 0, :3], self.samples[index, 1, :3] = point - self._origin, normal
         self.samples[: len(self._extended), 2, 2] = ~self._extended
+        self.samples[: len(self._extended), 2, 3] = 0.0 if self.preview else 1.0 / self._point_count
         self._draw_reach(sample)
         rows = self._rows
         if self.plan.world_directions:

@@ -31,9 +31,9 @@ class SunDisc:
     """The disc of a sky's sun as the camera sees it, added to the world's radiance; a `Light` of its own lights.
 
     `direction`, `zenith`: unit vectors in world space, to the disc's centre and straight up from the horizon.
-    `half_angle` (rad): angular radius. `lowest`, `highest`: radiance, scene-linear RGB, W/(sr·m²), at the elevations
-    (rad) `lowest_elevation` and `highest_elevation`, interpolated by elevation. It is multiplied by
-    1 − limb_darkening · (1 − √(1 − t²)), t being 0 at the centre and 1 at the limb, and is 0 below `horizon` (rad).
+    `half_angle` (rad): angular radius. Elevations are in rad above the centre's: radiance, scene-linear RGB,
+    W/(sr·m²), goes evenly from `lowest` at `lowest_elevation` to `highest` at `half_angle`, times
+    1 − limb_darkening · (1 − √(1 − t²)), t being 0 at the centre and 1 at the limb; it is 0 below `horizon`.
     """
 
     direction: tuple[float, float, float]
@@ -42,7 +42,6 @@ class SunDisc:
     lowest: Color
     highest: Color
     lowest_elevation: float
-    highest_elevation: float
     horizon: float
     limb_darkening: float
 

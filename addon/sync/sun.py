@@ -50,9 +50,8 @@ def sun_disc(sky: Sky, size: float, color: Color, environment_from_world: Float6
         half_angle=half,
         lowest=_triple(lowest),
         highest=_triple(highest),
-        lowest_elevation=0.0 if setting else sky.sun_elevation - half,
-        highest_elevation=sky.sun_elevation + half,
-        horizon=_horizon(sky),
+        lowest_elevation=-sky.sun_elevation if setting else -half,
+        horizon=_horizon(sky) - sky.sun_elevation,
         limb_darkening=_LIMB_DARKENING,
     )
 
@@ -65,14 +64,14 @@ def sun_irradiance(sky: Sky, size: float) -> Float64Array:
     angle = np.arccos(cosine)[:, None]
     around = (np.arange(_SPOKES) + 0.5) * (2.0 * np.pi / _SPOKES)
     sine = np.sin(sky.sun_elevation) * np.cos(angle) + np.cos(sky.sun_elevation) * np.sin(angle) * np.cos(around)
-    radiance = _shown(disc, angle, np.arcsin(np.clip(sine, -1.0, 1.0)))
+    radiance = _shown(disc, angle, np.arcsin(np.clip(sine, -1.0, 1.0)) - sky.sun_elevation)
     solid_angle = 2.0 * np.pi * (1.0 - np.cos(disc.half_angle))
     return np.mean(radiance * cosine[:, None, None], axis=(0, 1)) * solid_angle
 
 
 def _shown(disc: SunDisc, angle: Float64Array, elevation: Float64Array) -> Float64Array:
-    """(..., 3) radiance of a disc `angle` (rad) from its centre, at elevations (rad) that broadcast with it."""
-    height = (elevation - disc.lowest_elevation) / max(disc.highest_elevation - disc.lowest_elevation, 1e-9)
+    """(..., 3) radiance of a disc `angle` (rad) from its centre and `elevation` (rad) above it; both broadcast."""
+    height = (elevation - disc.lowest_elevation) / max(disc.half_angle - disc.lowest_elevation, 1e-9)
     lowest, highest = np.array(disc.lowest), np.array(disc.highest)
     limb = 1.0 - disc.limb_darkening * (1.0 - np.sqrt(np.maximum(1.0 - (angle / disc.half_angle) ** 2, 0.0)))
     return (lowest + (highest - lowest) * height[..., None]) * (limb * (elevation > disc.horizon))[..., None]

@@ -20,7 +20,7 @@ from agreement_torture import TORTURE
 import addon
 
 OUR_SAMPLES = 256
-CYCLES_SAMPLES, NOISY_SAMPLES = 512, 1024
+CYCLES_SAMPLES, NOISY_SAMPLES = 256, 512
 GLOSSY = ("point, sphere", "rectangle", "sun, wide", "world, panorama")
 
 

@@ -29,5 +29,6 @@ def test_colours_are_cycles(slots, tmp_path):
     assert pair.covered.all()
     for name in ("Diffuse Color", "Glossy Color"):
         ours, theirs = (passes[name][..., :3] for passes in (pair.ours, pair.cycles))
-        # Both interpolate tables of GGX's albedo, ours 8-bit material values besides.
-        np.testing.assert_allclose(ours, theirs, atol=0.004, err_msg=name)
+        # The share that GGX reflects is interpolated in a table by both; measured, they differ by 0.007 at grazing
+        # angles, where Cycles' is 0.13. A diffuse surface would be off by 0.037 and more.
+        np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=0.01, err_msg=name)

@@ -137,18 +137,6 @@ def test_the_sun_of_a_sky():
     assert texts == ()
 
 
-def test_the_sun_of_a_turned_sky():
-    tree, _, texture = sky_world(sun_rotation=0.4)
-    mapping = add(tree, "Mapping")
-    mapping.inputs["Rotation"].default_value = (0.0, 0.0, 0.3)
-    tree.links.new(add(tree, "TexCoord").outputs["Generated"], mapping.inputs["Vector"])
-    tree.links.new(mapping.outputs[0], texture.inputs["Vector"])
-    disc = read()[0].sun_disc
-    expected = np.cos(0.6) * np.array([np.sin(0.7), np.cos(0.7)])  # both turn clockwise, seen from above
-    np.testing.assert_allclose(disc.direction, (*expected, np.sin(0.6)), atol=1e-6)
-    assert disc.zenith == pytest.approx((0.0, 0.0, 1.0))
-
-
 def test_of_several_suns_one_is_seen():
     tree, background, _ = sky_world(sun_size=0.02)
     other, sky = add(tree, "Background"), add(tree, "TexSky", sky_type=SCATTERING, sun_disc=True, sun_size=0.04)

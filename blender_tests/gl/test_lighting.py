@@ -20,6 +20,7 @@ from addon.scene import (
     Sequence,
     Variant,
 )
+from addon.scene.versions import new_version
 from blender_tests import builders
 
 SIDE = 48
@@ -124,7 +125,7 @@ def test_layers_behind_are_shadowed_by_those_before_them(shared_session, variant
     """Sheets above one another: only the uppermost has light, whoever generates the layers."""
     sheets = [builders.quad(f"sheet {k}", z=-0.5 * k, half=3.0) for k in range(3)]
     light = builders.light(position=(0.3, 0.2, 4.0))
-    scene = builders.scene(*sheets, lights=(light,))
+    scene = fresh(builders.scene(*sheets, lights=(light,)))
     band = 8 if variant is Variant.REPROJECT else 0
     settings = {"layers": 3, "minimum_separation": 0.1, "variant": variant, "guard_band": band}
     view, bare = deep_views(shared_session, scene, builders.camera(half_width=0.3), **settings)
@@ -150,7 +151,7 @@ def floor_under(*batches, meshes=(), lights=None, materials=(builders.DIFFUSE,),
     lights = lights or (builders.light(position=(0.0, 0.0, 4.0), emission=(50, 50, 50)),)
     every = (builders.batch("floor"), *(replace(batch, seen_by_camera=False) for batch in batches))
     floor = builders.quad("floor", half=6.0)
-    return builders.scene(floor, *meshes, lights=lights, batches=every, materials=materials, images=images)
+    return fresh(builders.scene(floor, *meshes, lights=lights, batches=every, materials=materials, images=images))
 
 
 def floor_points():
@@ -235,7 +236,7 @@ def test_each_of_64_groups_is_told_from_all_others(shared_session, group):
     scene = floor_under(builders.batch("card"), meshes=(builders.quad("card", z=2.0, half=0.5),))
     lamp = scene.lights[0]
     floor, card = scene.batches
-    linked = (replace(floor, link_group=group, version=100 + group), card)
+    linked = (replace(floor, link_group=group, version=new_version()), card)
 
     def picture(batches, **change):
         changed = replace(scene, batches=batches, lights=(replace(lamp, **change),))
@@ -244,7 +245,7 @@ def test_each_of_64_groups_is_told_from_all_others(shared_session, group):
     expected = picture(scene.batches)
     np.testing.assert_array_equal(picture(linked, receiver_groups=1 << group), expected)
     assert not picture(linked, receiver_groups=ALL_GROUPS ^ 1 << group).any()
-    blockers = (floor, replace(card, link_group=group, version=100 + group))
+    blockers = (floor, replace(card, link_group=group, version=new_version()))
     whole = picture((floor,))
     np.testing.assert_array_equal(picture(blockers, blocker_groups=1 << group), expected)
     np.testing.assert_allclose(picture(blockers, blocker_groups=ALL_GROUPS ^ 1 << group), whole, rtol=1e-5)
@@ -350,7 +351,7 @@ def test_an_emissive_surface_that_is_not_there_lights_nothing(shared_session):
             materials=(builders.DIFFUSE, glow),
             batches=[builders.batch("floor"), replace(panel, seen_by_camera=False)],
         )
-        picture = shared_session.show(scene, ABOVE, Sequence(), **SETTINGS).channels[Channel.COMBINED][..., :3]
+        picture = shared_session.show(fresh(scene), ABOVE, Sequence(), **SETTINGS).channels[Channel.COMBINED][..., :3]
         assert picture.any() == is_lit
 
 
@@ -365,7 +366,7 @@ def test_every_marked_instance_lights_the_floor_below_it(shared_session):
         materials=(builders.DIFFUSE, glow),
         batches=[builders.batch("floor"), replace(panels, seen_by_camera=False)],
     )
-    view = shared_session.show(scene, builders.camera(half_width=1.0 / 3.0), Sequence(), **SETTINGS)
+    view = shared_session.show(fresh(scene), builders.camera(half_width=1.0 / 3.0), Sequence(), **SETTINGS)
     picture = view.channels[Channel.COMBINED][..., 0]
     spots = [picture[int((y + 1.0) * SIDE / 2), int((x + 1.0) * SIDE / 2)] for x, y in at]
     assert min(spots) > 0.5 * max(spots)

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from random_scenes import furnished, random_camera, random_scene
+from random_scenes import fresh, furnished, random_camera, random_scene
 
 from addon.scene import Channel, DebugView, EmissionSampling, EnvironmentMap, LightKind, Sequence
 from blender_tests import builders
@@ -153,7 +153,7 @@ def test_emission_is_what_surfaces_emit(shared_session):
     """The whole picture shows one surface: its colour to the 11 binary digits of the G-buffer."""
     glow = builders.material(emission=(0.25, 2.0, 0.5))
     scene = builders.scene(builders.quad("q", half=9.0), materials=(glow,), lights=(builders.light(),))
-    images = shown(shared_session, scene, builders.camera())
+    images = shown(shared_session, fresh(scene), builders.camera())
     np.testing.assert_allclose(images[Channel.EMISSION][..., :3], np.full((40, 40, 3), glow.emission), rtol=2**-10)
 
 
@@ -168,7 +168,9 @@ def furnace(session, **material):
         batches=[replace(builders.batch("q", [turned]), casts_shadow=False)],
         world=(1, 1, 1),
     )
-    return shown(session, scene, builders.camera(half_width=0.05), (*PASSES, *COLORS), samples=1, filter_radius=0.0)
+    return shown(
+        session, fresh(scene), builders.camera(half_width=0.05), (*PASSES, *COLORS), samples=1, filter_radius=0.0
+    )
 
 
 @pytest.mark.parametrize("roughness", [0.05, 0.5, 1.0])

@@ -4,7 +4,7 @@ from math import pi, sqrt
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from addon.render.mesh_lights import GREATEST_COUNT, SMALLEST_SHARE, mesh_lights
@@ -32,6 +32,7 @@ def soup(generator, count, key="soup"):
     return builders.mesh(key, positions, np.arange(3 * count))
 
 
+@settings(max_examples=20)
 @given(st.integers(1, 12), st.integers(0, 2**32 - 1))
 def test_points_are_uniform_over_the_area(count, seed):
     """Their mean is the surface's, within 5 standard errors, and each lies on the plane of its normal."""
@@ -48,6 +49,7 @@ def test_points_are_uniform_over_the_area(count, seed):
     assert np.linalg.norm(points - light.center, axis=1).max() <= light.radius * (1.0 + 1e-12)
 
 
+@settings(max_examples=10)
 @given(st.integers(0, 2**32 - 1))
 def test_points_fill_a_triangle_evenly(seed):
     """Barycentric coordinates of points uniform in a triangle: mean ⅓, variance 1/18, covariance −1/36."""

@@ -4,7 +4,17 @@ from dataclasses import replace
 import pytest
 
 from addon.render import frames_before, plan
-from addon.scene import Channel, DebugView, EmissionSampling, LightKind, RenderSettings, ShadingModel, SunDisc, Variant, World
+from addon.scene import (
+    Channel,
+    DebugView,
+    EmissionSampling,
+    LightKind,
+    RenderSettings,
+    ShadingModel,
+    SunDisc,
+    Variant,
+    World,
+)
 from blender_tests import builders
 
 SETTINGS = RenderSettings(64, 64, layers=4)
@@ -115,7 +125,7 @@ def test_a_debug_view_of_the_gbuffer_needs_no_light():
 
 
 def test_the_suns_disc_is_compiled_where_the_camera_sees_one():
-    disc = SunDisc((0.0, 0.0, 1.0), (0.0, 0.0, 1.0), 0.1, (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), 1.4, 1.6, 0.0, 0.6)
+    disc = SunDisc((0.0, 0.0, 1.0), (0.0, 0.0, 1.0), 0.1, (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), -0.1, -1.0, 0.6)
     for seen in (True, False):
         scene = replace(LIT, world=World(sun_disc=disc, seen_by_camera=seen))
         assert ("SUN_DISC" in plan(scene, SETTINGS).find("composite").defines) == seen

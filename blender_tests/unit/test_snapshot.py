@@ -61,7 +61,7 @@ def test_a_scene_comes_back_as_it_was(tmp_path_factory, positions, name, pixels)
         lights=(builders.light(radius=0.1),),
         images=(Image("i", name, 3, pixels, srgb=True),),
     )
-    disc = SunDisc((0.0, 0.6, 0.8), (0.0, 0.0, 1.0), 0.1, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), 0.6, 0.8, -0.1, 0.6)
+    disc = SunDisc((0.0, 0.6, 0.8), (0.0, 0.0, 1.0), 0.1, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), -0.1, -0.3, 0.6)
     environment = EnvironmentMap("e", name, 4, positions[None])
     world = World((1.0, 2.0, 3.0), environment, np.eye(3), disc, seen_by_glossy=False)
     hidden = replace(scene.batches[0], seen_by_camera=False, casts_shadow=False, link_group=63)

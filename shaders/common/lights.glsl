@@ -4,7 +4,8 @@
 // 0 the point: of area lights −1…1 along the half axes; of points, spots and suns in the unit ball, world axes; of
 //   emissive surfaces the position · how many shadow maps, −1 for the faces of a cube
 // 1 normal of an emissive surface there; of lamps the point's position · its first shadow map
-// 2 square of how far the light reaches in this sample, and in every sample, m² · 1 where its point is always the same
+// 2 square of how far the light reaches in this sample, and in every sample, m² · 1 where its point is always the same ·
+//   share of the light that the point stands for, 0 in a preview
 
 #include "common/constants.glsl"
 
@@ -45,6 +46,7 @@ struct LightPoint
     int shadow_count;
     int shadow_first;
     bool is_fixed;          // whether every sample has the same point
+    float share;            // of the light that the point stands for
 };
 
 struct LightSample
@@ -65,7 +67,7 @@ LightPoint fetch_light_point(int index)
     vec4 point = texelFetch(light_samples, first, 0);
     vec4 normal = texelFetch(light_samples, first + ivec2(1, 0), 0);
     vec4 reach = texelFetch(light_samples, first + ivec2(2, 0), 0);
-    return LightPoint(point.xyz, normal.xyz, int(point.w), int(normal.w), reach.z > 0.0);
+    return LightPoint(point.xyz, normal.xyz, int(point.w), int(normal.w), reach.z > 0.0, reach.w);
 }
 
 #ifdef LINKING
@@ -149,16 +151,32 @@ float spread_factor(Light light, float cosine)
     return max(light.spread_slope - sqrt(max(1.0 - cosine * cosine, 0.0)) / cosine, 0.0) / light.spread_norm;
 }
 
-LightSample sample_area(Light light, vec3 position, vec3 offset)
+/**
+ * Solid angle (sr) that an area (m²) seen from a squared distance (m²) at a cosine seems to have by one point of it.
+ *
+ * Within four radii of the patch that the point stands for, its radius is taken into account: right above its middle
+ * exactly (a disk's π r²/(d² + r²)), elsewhere so that the sum over points stays finite however near the surface is.
+ */
+float patch_solid_angle(float area, float share, float distance_squared, float cosine)
 {
+    float radius_squared = area * share / PI;
+    float near = radius_squared * clamp(1.0 - distance_squared / (16.0 * max(radius_squared, 1e-30)), 0.0, 1.0);
+    float height_squared = cosine * cosine * distance_squared;
+    float softened = distance_squared + near;
+    return area * sqrt((height_squared + near) / softened) / softened;
+}
+
+LightSample sample_area(Light light, vec3 position, LightPoint point)
+{
+    vec2 offset = point.offset.xy;
     vec3 to_light = light.position + offset.x * light.half_x + offset.y * light.half_y - position;
     float distance_squared = dot(to_light, to_light);
     vec3 direction = to_light * inversesqrt(distance_squared);
     float cosine = -dot(direction, light.axis);
     if (!(distance_squared > 0.0 && cosine > 0.0))
         return LightSample(-light.axis, vec3(0.0));
-    float facing = spread_factor(light, cosine) * light_area(light) * cosine / distance_squared;
-    return LightSample(direction, light.emission * facing);
+    float solid_angle = patch_solid_angle(light_area(light), point.share, distance_squared, cosine);
+    return LightSample(direction, light.emission * (spread_factor(light, cosine) * solid_angle));
 }
 
 /** An emissive surface, sampled at a position (camera-relative) with unit normal, uniformly over its area. */
@@ -171,7 +189,7 @@ LightSample sample_mesh(Light light, vec3 position, LightPoint point)
     vec3 direction = to_light * inversesqrt(distance_squared);
     float cosine = -dot(direction, point.normal);
     bool shines = cosine > 0.0 ? light.spread_slope > 0.0 : light.spread_norm > 0.0;
-    float weight = shines ? light.radius * abs(cosine) / distance_squared : 0.0;
+    float weight = shines ? patch_solid_angle(light.radius, point.share, distance_squared, abs(cosine)) : 0.0;
     return LightSample(direction, light.emission * weight);
 }
 
@@ -203,7 +221,7 @@ LightSample sample_light(Light light, vec3 position, LightPoint point)
 #endif
 #ifdef AREA_LIGHTS
     if (light.kind == LIGHT_AREA)
-        return sample_area(light, position, point.offset);
+        return sample_area(light, position, point);
 #endif
 #ifdef MESH_LIGHTS
     if (light.kind == LIGHT_MESH)

@@ -80,13 +80,16 @@ vec3 shown_color(ivec3 texel, float view_depth)
 /** Radiance, W/(sr·m²), of the sun's disc in a unit direction in world space, as SunDisc in scene/scene.py says. */
 vec3 sun_disc_radiance(vec3 direction)
 {
-    // By the chord, which is exact for small angles, unlike the cosine.
+    // Of small arguments, asin is exact on all drivers: from the chord, and from the sine of the elevations' difference.
     float angle = 2.0 * asin(min(0.5 * distance(direction, sun_direction.xyz), 1.0));
-    float elevation = asin(clamp(dot(direction, sun_zenith.xyz), -1.0, 1.0));
+    float elevation = asin(clamp(
+        dot(direction, sun_zenith.xyz) * length(cross(sun_direction.xyz, sun_zenith.xyz))
+            - length(cross(direction, sun_zenith.xyz)) * dot(sun_direction.xyz, sun_zenith.xyz),
+        -1.0, 1.0));
     if (angle >= sun_direction.w || elevation <= sun_zenith.w)
         return vec3(0.0);
-    float height = (elevation - sun_lowest.w) / max(sun_highest.w - sun_lowest.w, 1e-9);
-    float limb = 1.0 - sun_limb_darkening * (1.0 - sqrt(1.0 - (angle / sun_direction.w) * (angle / sun_direction.w)));
+    float height = (elevation - sun_lowest.w) / max(sun_direction.w - sun_lowest.w, 1e-9);
+    float limb = 1.0 - sun_highest.w * (1.0 - sqrt(1.0 - (angle / sun_direction.w) * (angle / sun_direction.w)));
     return mix(sun_lowest.rgb, sun_highest.rgb, height) * limb;
 }
 #endif

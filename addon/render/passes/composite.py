@@ -14,11 +14,10 @@ from .base import Frame, subsets
 from .fullscreen import FullscreenDraw, fullscreen_program
 
 SUN_DISC_UNIFORMS = (
-    ("sun_direction", "vec4"),  # and its angular radius
-    ("sun_zenith", "vec4"),  # and the horizon's elevation
-    ("sun_lowest", "vec4"),  # radiance and its elevation
-    ("sun_highest", "vec4"),  # likewise
-    ("sun_limb_darkening", "float"),
+    ("sun_direction", "vec4"),  # and half_angle
+    ("sun_zenith", "vec4"),  # and horizon
+    ("sun_lowest", "vec4"),  # and lowest_elevation
+    ("sun_highest", "vec4"),  # and limb_darkening
 )
 
 COMPOSITE_UNIFORMS = UniformBlock(
@@ -94,8 +93,7 @@ def _sun_disc_uniforms(disc: SunDisc | None) -> dict[str, object]:
         "sun_direction": (*disc.direction, disc.half_angle),
         "sun_zenith": (*disc.zenith, disc.horizon),
         "sun_lowest": (*disc.lowest, disc.lowest_elevation),
-        "sun_highest": (*disc.highest, disc.highest_elevation),
-        "sun_limb_darkening": disc.limb_darkening,
+        "sun_highest": (*disc.highest, disc.limb_darkening),
     }
 
 
