@@ -16,6 +16,7 @@ from ..scene import AreaShape, Camera, Light, LightKind, Scene
 from ..scene.arrays import Float64Array, Int64Array
 from .frustum import boxes_inside, boxes_near, frustum_planes, scene_boxes
 from .light_table import FULL_SPREAD, NARROWEST_HALF_SPREAD
+from .memory import Memory
 
 MANY_LIGHTS = 16
 """With more lights than these, each is only there where it reaches, and pixels only ask those that reach their tile."""
@@ -90,7 +91,7 @@ def farthest_reach(full: Float64Array, keys: Sequence[str], draws: int, seed: in
 
 
 def lights_out_of_reach(
-    lights: Sequence[Light], farthest: Float64Array, scene: Scene, camera: Camera
+    lights: Sequence[Light], farthest: Float64Array, scene: Scene, camera: Camera, memory: Memory
 ) -> list[tuple[int, str]]:
     """Which lights no surface in the picture can show, and why: their indices in ascending order, each with the reason.
 
@@ -99,7 +100,7 @@ def lights_out_of_reach(
     planes = frustum_planes(camera)
     seen = np.zeros((0, 2, 3))
     if np.isfinite(farthest).any():
-        boxes = scene_boxes(scene)
+        boxes = memory.recall("boxes", (scene,), lambda: scene_boxes(scene))
         seen = boxes[boxes_inside(boxes, planes)]
     groups = 0
     for batch in scene.batches:

@@ -24,6 +24,9 @@ _NARROWEST_SOFT_EDGE = 1e-6
 FULL_SPREAD = np.pi - 1e-4
 """Emission angle (rad) of area lights from which on they emit all around."""
 
+WIDEST_SUN = 0.5 * np.pi - 1e-3
+"""Half angle (rad) of the largest sun: half the sky, but for what would have no tangent."""
+
 NARROWEST_HALF_SPREAD = 1e-3
 """Half of the narrowest emission angle (rad) that is kept, as in Cycles."""
 
@@ -41,7 +44,8 @@ def light_rows(lights: Sequence[Light], origin: Float64Array) -> Float32Array:
     for row, light in zip(rows, lights, strict=True):
         rotation = light.world_from_light[:3, :3]
         row[0] = (*(light.world_from_light[:3, 3] - origin), KIND_CODES[light.kind])
-        row[1] = (*-rotation[:, 2], 0.5 * light.angle if light.kind is LightKind.SUN else light.radius)
+        half_angle = min(0.5 * light.angle, WIDEST_SUN)
+        row[1] = (*-rotation[:, 2], half_angle if light.kind is LightKind.SUN else light.radius)
         row[2, :3] = np.minimum(light.emission, GREATEST_EMISSION)
         if light.kind is LightKind.SPOT:
             cosine = np.cos(0.5 * light.angle)

@@ -134,12 +134,18 @@ class Lighting:
         return numbers
 
     def _lamp_offsets(self, cube: Float64Array) -> Float64Array:
-        """(L, 3) of each lamp: in the ball; of area lights in the square or disk, z = 0. `cube`: (L, 3) in [0, 1)."""
+        """(L, 3) of each lamp: in the ball, of suns in the disk across; of area lights in the square or disk, z = 0.
+
+        `cube`: (L, 3) in [0, 1).
+        """
         lights, lamps = self.plan.lights, len(self.plan.lights)
         offsets = ball_points(self.numbers[:lamps], self._point_count, self._shifts[:lamps])
         for points, shape in ((square_points(cube), AreaShape.RECTANGLE), (disk_points(cube), AreaShape.ELLIPSE)):
             chosen = [light.kind is LightKind.AREA and light.shape is shape for light in lights]
             offsets[chosen] = points[chosen]
+        for index, (light, (x, y, _)) in enumerate(zip(lights, disk_points(cube), strict=True)):
+            if light.kind is LightKind.SUN:  # everybody sees it from the same side: a disk is more even than a ball
+                offsets[index] = light.world_from_light[:3, :2] @ (x, y)
         return offsets
 
     def _draw_reach(self, sample: int) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..scene import Camera, EmissionSampling, Light, RenderSettings, Scene
 from .light_reach import MANY_LIGHTS, extent, farthest_reach, full_reach, lights_out_of_reach, peak_intensity
+from .memory import Memory
 from .mesh_lights import MeshLight, mesh_lights
 
 
@@ -38,12 +39,16 @@ class LightPlan:
 
 
 def plan_lights(
-    scene: Scene, settings: RenderSettings, camera: Camera | None, *, continuous: bool
+    scene: Scene, settings: RenderSettings, camera: Camera | None, memory: Memory, *, continuous: bool
 ) -> tuple[LightPlan, list[tuple[str, str]]]:
-    """The lights of a picture, and (name, reason) of what is left out."""
+    """The lights of a picture, and (name, reason) of what is left out.
+
+    `memory` of earlier pictures afterwards holds what this one is made of.
+    """
     left_out: list[tuple[str, str]] = []
-    lights = _lights_in_reach(scene, settings, camera, left_out)
-    surfaces, dim = mesh_lights(scene, settings.alpha_threshold)
+    lights = _lights_in_reach(scene, settings, camera, memory, left_out)
+    surfaces, dim = mesh_lights(scene, settings.alpha_threshold, memory)
+    memory.forget_unused()
     left_out += [
         (f"light of {light.name}", "too faint to be sampled as a light; left to indirect light") for light in dim
     ]
@@ -70,7 +75,7 @@ def plan_lights(
 
 
 def _lights_in_reach(
-    scene: Scene, settings: RenderSettings, camera: Camera | None, left_out: list[tuple[str, str]]
+    scene: Scene, settings: RenderSettings, camera: Camera | None, memory: Memory, left_out: list[tuple[str, str]]
 ) -> tuple[Light, ...]:
     """Those that may reach what the camera sees."""
     if camera is None or not scene.lights:
@@ -80,6 +85,6 @@ def _lights_in_reach(
     full = full_reach(intensities, extents, settings.light_threshold)
     keys = [light.key for light in scene.lights]
     farthest = farthest_reach(full, keys, settings.samples, settings.seed)
-    lost = dict(lights_out_of_reach(scene.lights, farthest, scene, camera))
+    lost = dict(lights_out_of_reach(scene.lights, farthest, scene, camera, memory))
     left_out += [(f"light “{scene.lights[index].name}”", reason) for index, reason in lost.items()]
     return tuple(light for index, light in enumerate(scene.lights) if index not in lost)

@@ -9,6 +9,7 @@ from ..scene import Camera, Channel, DebugView, RenderSettings, Scene, ShadingMo
 from .layout import CHANNELS, EXIT_CHANNELS, GBufferChannel, TargetSpec
 from .lighting_passes import SPLIT_TARGETS, plan_lighting_passes
 from .lighting_plan import LightPlan, plan_lights
+from .memory import Memory
 from .planned_pass import LeftOut, PlannedPass
 
 
@@ -93,10 +94,17 @@ _FILM_CHANNELS = {
 }
 
 
-def plan(scene: Scene, settings: RenderSettings, camera: Camera | None = None, *, continuous: bool = False) -> Plan:
+def plan(
+    scene: Scene,
+    settings: RenderSettings,
+    camera: Camera | None = None,
+    *,
+    continuous: bool = False,
+    memory: Memory | None = None,
+) -> Plan:
     """Decide the passes for one scene, seen by a camera (None: it may be anywhere), and one set of settings.
 
-    `continuous` as in `Sequence`.
+    `continuous` as in `Sequence`. `memory` of earlier plans makes this one faster.
     """
     left_out: list[LeftOut] = []
     layers = _layer_count(settings, left_out)
@@ -104,7 +112,7 @@ def plan(scene: Scene, settings: RenderSettings, camera: Camera | None = None, *
     look_ahead = _looks_ahead(variant, settings, continuous=continuous)
     guard_band = _plan_guard_band(settings, variant, left_out)
     view = camera and guarded(camera, settings, guard_band)
-    lights, dark = plan_lights(scene, settings, view, continuous=continuous)
+    lights, dark = plan_lights(scene, settings, view, memory or Memory(), continuous=continuous)
     left_out += [LeftOut(name, reason) for name, reason in dark]
     lighting = plan_lighting_passes(scene, settings, lights, layers, left_out)
     direct = lighting[-1] if lighting else None

@@ -16,6 +16,7 @@ from .geometry import GeometryStore
 from .images import ImageStore
 from .layering import Trial, calibration_view, resolved
 from .lighting import Lighting
+from .memory import Memory
 from .oracle_state import OracleState
 from .passes import PASSES, Frame, Pass
 from .plan import FIRST_SAMPLE_CHANNELS, Plan, plan
@@ -37,6 +38,7 @@ class Renderer:
         self._correspondences: list[tuple[Scene, Correspondence]] = []
         self._images = ImageStore(device)
         self._oracle = OracleState()
+        self._memory = Memory()
         self._lighting = Lighting(device)
         self._environment = EnvironmentTextures(device)
         self._film = Film(device)
@@ -59,7 +61,7 @@ class Renderer:
         self._frame = None
         oracle, self._oracle = self._oracle, OracleState()  # where anything fails, nothing is known any more
         sequence = sequence or Sequence()
-        planned = plan(scene, settings, camera, continuous=sequence.continuous)
+        planned = plan(scene, settings, camera, continuous=sequence.continuous, memory=self._memory)
         self._pool.prepare(
             (settings.width, settings.height),
             planned.targets,

@@ -209,7 +209,7 @@ def test_a_pierced_card_lets_light_through_its_holes(shared_session):
     near = (np.abs(outside) < TEXEL) | (np.minimum(np.abs(x), np.abs(y)) < TEXEL)
     shares = shadow_of(shared_session, scene)
     assert_is(shares, (outside > 0.0) | (x * y > 0.0), near)
-    opaque = shadow_of(shared_session, fresh(scene), alpha_threshold=0.0)
+    opaque = shadow_of(shared_session, scene, alpha_threshold=0.0)
     assert_is(opaque, outside > 0.0, near)
 
 
@@ -267,7 +267,7 @@ def test_linked_lights_among_many(shared_session):
     assert pictures[0][..., :3].all()
 
 
-@pytest.mark.parametrize(("kind", "continuous"), zip(LightKind, (False, True, False, True), strict=True))
+@pytest.mark.parametrize(("kind", "continuous"), list(zip(LightKind, (False, True, False, True), strict=True)))
 def test_a_scene_without_casters_or_receivers_is_lit_and_empty(shared_session, kind, continuous):
     """Nothing that casts shadows, nothing in view, no geometry at all: neither fails."""
     light = builders.light(kind, (0, 0, 4), (5, 5, 5), angle=1.0, size=(1, 1), radius=0.0)
@@ -323,6 +323,14 @@ def test_no_light_passes_beside_the_map_of_a_large_spot(shared_session, radius):
     scene = floor_under(builders.batch("lid"), meshes=(lid,), lights=(light,))
     picture = shared_session.show(scene, ABOVE, Sequence(), **SETTINGS | {"samples": 64})
     assert not picture.channels[Channel.COMBINED][..., :3].any()
+
+
+def test_a_wide_filter_sees_no_light_around_the_picture(shared_session):
+    """What sub-pixel jitter shows beyond the edge is on the maps as well: a lid above keeps the sun off all of it."""
+    lights = (builders.light(LightKind.SUN, (0, 0, 4), (5, 5, 5), angle=0.1), builders.light(LightKind.SPOT, angle=1.0))
+    scene = floor_under(builders.batch("lid"), meshes=(builders.quad("lid", z=1.0, half=5.5),), lights=lights)
+    settings = SETTINGS | {"samples": 24, "filter_radius": 16.0}
+    assert not shared_session.show(scene, ABOVE, Sequence(), **settings).channels[Channel.COMBINED][..., :3].any()
 
 
 @pytest.mark.parametrize("band", [0, 8, 30])
