@@ -19,6 +19,9 @@ _STRETCH = 17
 _MOST_STEPS = 512
 """How many orders of a pattern's points are tried."""
 
+_MOST_SHIFTS = 4096
+"""How many lights' shifts are remembered."""
+
 _BALL_TABLE_SIZE = 4097
 
 
@@ -90,9 +93,13 @@ def _coprime(count: int, ratio: float) -> int:
 
 def light_shifts(keys: Sequence[str], seed: int) -> Float64Array:
     """(L, 3) in [0, 1): where each light's lattice starts, by its key, so that other lights change nothing."""
-    return np.array([np.random.default_rng((crc32(key.encode()), seed)).random(3) for key in keys], np.float64).reshape(
-        -1, 3
-    )
+    return np.array([_shift(key, seed) for key in keys], np.float64).reshape(-1, 3)
+
+
+@lru_cache(maxsize=_MOST_SHIFTS)
+def _shift(key: str, seed: int) -> tuple[float, float, float]:
+    x, y, z = np.random.default_rng((crc32(key.encode()), seed)).random(3).tolist()
+    return x, y, z
 
 
 def folded(points: Float64Array) -> Float64Array:

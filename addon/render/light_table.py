@@ -71,7 +71,7 @@ def mesh_light_rows(lights: Sequence[MeshLight]) -> Float32Array:
     """
     rows = np.zeros((len(lights), TEXELS_PER_LIGHT, 4), np.float32)
     for row, light in zip(rows, lights, strict=True):
-        row[0, 3], row[1, 3] = MESH_CODE, light.area
+        row[0, 3], row[1, 3] = MESH_CODE, light.surface.area
         row[2, :3] = np.minimum(light.emission, GREATEST_EMISSION)
         row[5] = (1.0, 1.0, light.front, light.back)
         row[6] = _group_words(ALL_GROUPS)

@@ -82,7 +82,7 @@ class Lighting:
             self.points[index] = lamp_point(light, offset)
             self.samples[index, 1, :3] = self.points[index] - self._origin
         for index, light in enumerate(self.plan.mesh_lights, start=lamps):
-            point, normal = light.point(cube[index])
+            point, normal = light.surface.point(cube[index])
             self.points[index] = point
             self.samples[index, 0, :3], self.samples[index, 1, :3] = point - self._origin, normal
         self.samples[: len(self._extended), 2, 2] = ~self._extended

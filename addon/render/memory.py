@@ -15,6 +15,11 @@ class Memory:
         self._used: set[tuple[Hashable, ...]] = set()
         self._is_new = False
 
+    @property
+    def count(self) -> int:
+        """How many results are held."""
+        return len(self._held)
+
     def recall(self, what: Hashable, of: tuple[object, ...], make: Callable[[], T]) -> T:
         """What `make` returns, from before where that was asked `of` the very same objects, which are held as long."""
         key = (what, *map(id, of))

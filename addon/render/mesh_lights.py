@@ -78,14 +78,14 @@ def _instances(
 ) -> Iterator[MeshLight]:
     sampling = material.emission_sampling
     marked = sampling is not EmissionSampling.AUTO
-    surface = memory.recall("slot", (mesh, slot), lambda: SlotSurface(mesh, slot))
+    whole = memory.recall("slot", (mesh, slot), lambda: Surface(SlotSurface(mesh, slot), np.eye(4)))
     rows = memory.recall("largest", (batch,), lambda: _from_the_largest(batch))
     for row in rows[: None if marked else GREATEST_COUNT + 1].tolist():
         yield MeshLight(
             key=f"{batch.key}/{slot.slot}/{batch.ids[row]}",
             name=f"{mesh.name} ({material.name})",
             emission=material.emission,
-            surface=memory.recall(("surface", row), (surface, batch), lambda row=row: Surface(surface, batch.matrices[row])),
+            surface=memory.recall(("surface", row), (whole, batch), lambda row=row: whole.placed(batch.matrices[row])),
             front=sampling is not EmissionSampling.BACK,
             back=sampling is not EmissionSampling.FRONT,
             link_group=batch.link_group,

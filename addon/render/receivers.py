@@ -12,6 +12,16 @@ from ..scene.arrays import BoolArray, Float32Array, Float64Array
 MOST_TILES = 1024
 """More tiles than this are merged by fours: fitting maps to them takes time for every light."""
 
+FACE_AXES = np.array([sign * axis for axis in np.eye(3) for sign in (1.0, -1.0)]) + 0.0
+"""(6, 3) the directions of a cube's faces: +X, −X, +Y, −Y, +Z, −Z."""
+
+FACE_SIDES = np.array([[axis, *(axis + side for side in FACE_AXES if axis @ side == 0.0)] for axis in FACE_AXES])
+"""(6, 5, 3) normals of the half spaces whose intersection is what a cube's face shows: ahead of it, and its sides."""
+
+SIDES, SIDE_OF_FACE = np.unique(FACE_SIDES.reshape(-1, 3), axis=0, return_inverse=True)
+SIDE_OF_FACE = SIDE_OF_FACE.reshape(6, 5)
+"""(18, 3) the different ones of them, and (6, 5) which of these they are."""
+
 _DEPTH_MARGIN = 0.01
 """Share of its view depth by which a tile is grown: sub-pixel jitter shows a little more than pixel centres do."""
 
@@ -52,6 +62,11 @@ class Receivers:
         """Centres (P, 3) in world space and radii (P,) of balls that hold the tiles."""
         center = self.corners.mean(axis=1)
         return center, np.linalg.norm(self.corners - center[:, None], axis=-1).max(axis=1, initial=0.0)
+
+    @cached_property
+    def ends(self) -> Float64Array:
+        """(18, P) how far each tile reaches along `FACE_SIDES`, those that are there twice as one: `SIDE_OF_FACE`."""
+        return np.ascontiguousarray((self.corners @ SIDES.T).max(axis=1, initial=-np.inf).T)
 
     def between(self, start: float, end: float) -> "Receivers":
         """What of them is within a range of view depths, m."""

@@ -175,6 +175,7 @@ class Renderer:
         self._environment.release()
         self._oracle = OracleState()
         self._correspondences.clear()
+        self._memory = Memory()
         self._timers.forget()
         self._frame = None
 

@@ -22,6 +22,7 @@ from .shadow_views import (
     cube_maps,
     sun_maps,
 )
+from .surfaces import Surface
 
 _EVERYWHERE = Cone(np.array([0.0, 0.0, 1.0]), pi)
 _CUBE_SHARE = 2
@@ -40,8 +41,8 @@ class ShadowSource:
     """A light that casts shadows: its `index` among the lights, and which groups of instances block it.
 
     `center` (3,), world space: its middle, which no point of it is farther from than `extent` (m); None where it is
-    infinitely far. `texel`: `Light.shadow_texel`. `share`: what the largest map's size is divided by; `cascades`: how
-    many maps a distant light may have.
+    infinitely far. `nearest` (m): what is nearer to its sampled point blocks nothing. `texel`: `Light.shadow_texel`.
+    `share`: what the largest map's size is divided by; `cascades`: how many maps a distant light may have.
     """
 
     index: int
@@ -52,6 +53,7 @@ class ShadowSource:
     texel: float = 0.0
     share: int = 1
     cascades: int = MOST_CASCADES
+    nearest: float = 0.0
 
     @property
     def texels_per_pixel(self) -> float:
@@ -74,7 +76,7 @@ class ShadowSource:
         fineness = Fineness(largest // self.share, self.texels_per_pixel, self.texel)
         if self.center is None:
             return sun_maps(-point, receivers, casters, fineness, self.cascades)
-        local = LocalReceivers(receivers, self.center, self.extent, self.cone, reach)
+        local = LocalReceivers(receivers, self.center, self.extent, self.cone, reach, self.nearest)
         if not local.any:
             return ()
         if self.is_cube:
@@ -86,8 +88,7 @@ def shadow_sources(planned: LightPlan) -> tuple[ShadowSource, ...]:
     """The lights of a plan that cast shadows."""
     sources = [_lamp_source(index, light) for index, light in enumerate(planned.lights) if light.casts_shadow]
     sources += [
-        ShadowSource(index, ALL_GROUPS, light.center, light.radius, share=_CUBE_SHARE)
-        for index, light in enumerate(planned.mesh_lights, start=len(planned.lights))
+        _surface_source(index, light.surface) for index, light in enumerate(planned.mesh_lights, len(planned.lights))
     ]
     first = planned.count - planned.world_directions
     sources += [
@@ -95,6 +96,12 @@ def shadow_sources(planned: LightPlan) -> tuple[ShadowSource, ...]:
         for index in range(first, planned.count)
     ]
     return tuple(sources)
+
+
+def _surface_source(index: int, surface: Surface) -> ShadowSource:
+    """An emissive surface's; it does not shadow itself where it is not exactly where its points are."""
+    center, radius = surface.center, surface.radius
+    return ShadowSource(index, ALL_GROUPS, center, radius, share=_CUBE_SHARE, nearest=surface.rounding)
 
 
 def _lamp_source(index: int, light: Light) -> ShadowSource:

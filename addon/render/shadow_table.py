@@ -13,12 +13,12 @@ SHADOW_CUBE = -1.0
 """Stands in place of a light's number of maps where they are the six faces of a cube."""
 
 
-def shadow_row(camera: Camera, slot: Slot, origin: Float64Array) -> Float32Array:
+def shadow_row(camera: Camera, slot: Slot, origin: Float64Array, extent: float) -> Float32Array:
     """(6, 4) float32 of one map: four matrix rows from camera-relative (`origin` (3,)) to map space, its place, optics.
 
     Map space (x, y, n, w): texel of the map's page x/w, y/w, nearness n/w as `shadow_maps.frag` has it. The place:
     lower left texel x, y, texels a side (0: there is no map), page. The optics: width of a texel at distance 1
-    (orthographic: m), whether it is orthographic.
+    (orthographic: m), whether it is orthographic, and `extent`: m from its camera to the farthest corner of a caster.
     """
     left, right, bottom, top = camera.window
     to_texel = np.array([slot.size / (right - left), slot.size / (top - bottom)])
@@ -40,7 +40,7 @@ def shadow_row(camera: Camera, slot: Slot, origin: Float64Array) -> Float32Array
         rows[2, 3] = 1.0
         rows[3] = depth
     place = (slot.x, slot.y, slot.size, slot.page)
-    optics = ((right - left) / slot.size, camera.orthographic, 0.0, 0.0)
+    optics = ((right - left) / slot.size, camera.orthographic, extent, 0.0)
     return np.vstack([rows, place, optics]).astype(np.float32)
 
 

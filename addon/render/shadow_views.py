@@ -2,13 +2,14 @@
 """What shadow maps a light needs for what the camera sees: which way they look, how far and how finely."""
 
 from dataclasses import dataclass
+from functools import cache
 from math import ceil, floor, log, log2, pi, tan
 
 import numpy as np
 
 from ..scene import Camera
-from ..scene.arrays import BoolArray, Float64Array
-from .receivers import Receivers
+from ..scene.arrays import Float64Array, Int64Array
+from .receivers import FACE_AXES, SIDE_OF_FACE, SIDES, Receivers
 
 SMALLEST_SIZE = 32
 WIDEST_SINGLE = pi / 3.0
@@ -31,6 +32,9 @@ _CASCADE_RATIO = 4.0
 
 _NEAREST_SHARE = 1e-6
 """Near plane of perspective maps over the farthest distance: 1/z in float32 does not mind."""
+
+_ROUNDINGS = 16.0 * float(np.finfo(np.float64).eps)
+"""Share of coordinates by which sums of three of them are off at most."""
 
 
 @dataclass(frozen=True)
@@ -60,103 +64,123 @@ class Cone:
 
 
 class LocalReceivers:
-    """Receivers as one light near them sees them; for all points of the light alike, which is `extent` m about."""
+    """Receivers as one light near them sees them; for all points of the light alike, which is `extent` m about.
 
-    def __init__(self, receivers: Receivers, position: Float64Array, extent: float, cone: Cone, reach: float) -> None:
+    What is nearer to the light than `nearest` m is not in its maps.
+    """
+
+    def __init__(
+        self,
+        receivers: Receivers,
+        position: Float64Array,
+        extent: float,
+        cone: Cone,
+        reach: float,
+        nearest: float = 0.0,
+    ) -> None:
         centers, radii = receivers.balls
         center = centers - position
         radius = radii + extent
-        distance = np.linalg.norm(center, axis=-1)
+        distance = np.sqrt((center**2).sum(axis=1))
         within = distance - radius < reach
         if cone.half_angle < pi:
             cosine = center @ cone.axis / np.maximum(distance, 1e-300)
             angle = np.arccos(np.clip(cosine, -1.0, 1.0))
             slack = np.arcsin(np.clip(radius / np.maximum(distance, 1e-300), 0.0, 1.0))
             within &= (angle < cone.half_angle + slack) | (distance <= radius)
-        self._corners = receivers.corners[within] - position
-        self._extent = extent
-        self._center = position
+        self._receivers, self._within = receivers, np.flatnonzero(within)
+        self._position, self._extent = position, extent
+        self._centers, distance, radius = center[self._within], distance[self._within], radius[self._within]
         # How wide a pixel is, seen from the light.
-        nearest = np.maximum(distance - radius, 0.5 * distance)
-        self._pixel_angles = receivers.pixels[within] / np.maximum(nearest[within], 1e-12)
-        self.farthest = min(float((distance + radius)[within].max(initial=0.0)), reach + extent)
+        closest = np.maximum(distance - radius, 0.5 * distance)
+        self._pixel_angles = receivers.pixels[self._within] / np.maximum(closest, 1e-12)
+        self.farthest = min(float((distance + radius).max(initial=0.0)), reach + extent)
+        self._end = _rounded_up(max(self.farthest, 2.0 * nearest, 1e-6))
+        self._start = max(nearest, _NEAREST_SHARE * self._end)
 
     @property
     def any(self) -> bool:
         """Whether the light reaches anything that is seen."""
-        return len(self._corners) > 0
+        return len(self._within) > 0
 
     @property
-    def all(self) -> BoolArray:
-        """(P,) every one of them."""
-        return np.ones(len(self._corners), np.bool_)
+    def all(self) -> Int64Array:
+        """(P,) the numbers of them."""
+        return np.arange(len(self._within))
 
-    def faces(self) -> BoolArray:
-        """(6, P) which receivers each face of a cube about the light may see: +X, −X, +Y, −Y, +Z, −Z."""
-        seen: list[BoolArray] = []
-        slack = 2.0 * self._extent
-        for axis in range(3):
-            for sign in (1.0, -1.0):
-                ahead = sign * self._corners[..., axis] + slack
-                sides = [self._corners[..., other] for other in range(3) if other != axis]
-                outside = [(ahead < side).all(axis=1) for side in (*sides, *(-side for side in sides))]
-                seen.append(~np.logical_or.reduce(outside) & (ahead > 0.0).any(axis=1))
-        return np.array(seen)
+    def faces(self) -> list[Int64Array]:
+        """Six arrays: the numbers of those that each face of a cube about the light may see, in `FACE_AXES`' order."""
+        offsets = SIDES @ self._position
+        slack = 2.0 * self._extent + _ROUNDINGS * (float(np.abs(offsets).max()) + self.farthest)
+        beyond = self._receivers.ends[:, self._within] >= (offsets - slack)[:, None]
+        seen = np.logical_and.reduce(beyond[SIDE_OF_FACE], axis=1)
+        return [np.flatnonzero(face) for face in seen]
 
     def map(
-        self, point: Float64Array, axis: Float64Array, half: float, fineness: Fineness, seen: BoolArray
+        self, point: Float64Array, frame: Float64Array, half: float, fineness: Fineness, seen: Int64Array
     ) -> ShadowMap:
-        """What those of them that are `seen` (P,) need of a map from a point of the light along an axis.
+        """What those of them with the numbers `seen` (N,) need of a map from a point of the light.
 
-        `half`: half width, at distance 1, of all that it may show; where they fill little of that, it shows no more.
+        `frame` (3, 3): rotation of its camera. `half`: half width, at distance 1, of all that it may show; where they
+        fill little of that, it shows no more.
         """
-        frame = look_along(axis)
-        middle, half = self._window(self._corners[seen] - (point - self._center), frame, half)
-        angle = float(np.quantile(self._pixel_angles[seen], _FINEST_SHARE)) / fineness.texels_per_pixel
+        (x, y), half = self._window(point, frame, half, seen)
+        finest = int(_FINEST_SHARE * (len(seen) - 1))
+        angle = float(np.partition(self._pixel_angles[seen], finest)[finest]) / fineness.texels_per_pixel
         size = _power_of_two(2.0 * half / max(angle, fineness.smallest, 1e-12), fineness.largest)
         half *= size / (size - 2.0)  # the outermost texels are a margin, so that a lookup beside the edge stays inside
-        x, y = middle
-        reach = _rounded_up(max(self.farthest, 1e-6))
         pose = np.eye(4)
         pose[:3, :3], pose[:3, 3] = frame, point
-        return ShadowMap(Camera(pose, (x - half, x + half, y - half, y + half), _NEAREST_SHARE * reach, reach), size)
+        return ShadowMap(Camera(pose, (x - half, x + half, y - half, y + half), self._start, self._end), size)
 
-    @staticmethod
-    def _window(corners: Float64Array, frame: Float64Array, half: float) -> tuple[tuple[float, float], float]:
-        """Middle and half width, at distance 1, of what corners (P, 8, 3) need of a window that is `half` wide.
+    def _window(
+        self, point: Float64Array, frame: Float64Array, half: float, seen: Int64Array
+    ) -> tuple[tuple[float, float], float]:
+        """Middle and half width, at distance 1, of what is `seen` of a window that is `half` wide.
 
         In steps, so that it stays the same while the camera moves a little.
         """
-        seen = corners.reshape(-1, 3) @ frame
-        if (seen[:, 2] > -1e-9).any():  # one beside or behind the light is everywhere
+        # The corners need no less than the middles between them: where that is too much there is no need to look.
+        if _needed(self._centers[seen] - (point - self._position), frame, half) is None:
             return (0.0, 0.0), half
-        projected = np.clip(seen[:, :2] / -seen[:, 2:], -half, half)
-        low, high = projected.min(axis=0), projected.max(axis=0)
-        needed = 0.5 * _rounded_up(1.15 * max(float((high - low).max()), 1e-9))
-        if needed > _SMALL_SHARE * half:
+        corners = self._receivers.corners[self._within[seen]] - point
+        needed = _needed(corners.reshape(-1, 3), frame, half)
+        if needed is None:
             return (0.0, 0.0), half
-        step = needed / 8.0
-        x, y = (step * floor(value / step + 0.5) for value in (0.5 * (low + high)).tolist())
-        return (x, y), needed
+        middle, width = needed
+        step = width / 8.0
+        x, y = (step * floor(value / step + 0.5) for value in middle)
+        return (x, y), width
+
+
+def _needed(points: Float64Array, frame: Float64Array, half: float) -> tuple[tuple[float, float], float] | None:
+    """Middle and half width at distance 1 of a window that shows points (N, 3) about its camera.
+
+    None where that is hardly less than all of `half`, or where any is beside or behind the camera: it is everywhere.
+    """
+    x, y, z = frame.T @ points.T
+    if z.max() > -1e-9:
+        return None
+    x, y = x / -z, y / -z
+    left, right, low, high = (min(max(float(end), -half), half) for end in (x.min(), x.max(), y.min(), y.max()))
+    needed = 0.5 * _rounded_up(1.15 * max(right - left, high - low, 1e-9))
+    if needed > _SMALL_SHARE * half:
+        return None
+    return (0.5 * (left + right), 0.5 * (low + high)), needed
 
 
 def cone_map(point: Float64Array, cone: Cone, receivers: LocalReceivers, fineness: Fineness) -> ShadowMap:
     """The one map of a light that shines in a narrow cone."""
     half = tan(min(max(cone.half_angle, NARROWEST), WIDEST_SINGLE))
-    return receivers.map(point, cone.axis, half, fineness, receivers.all)
+    return receivers.map(point, look_along(cone.axis), half, fineness, receivers.all)
 
 
 def cube_maps(point: Float64Array, receivers: LocalReceivers, fineness: Fineness) -> tuple[ShadowMap | None, ...]:
     """The six faces of a cube about a light, None where a face sees nothing that is seen."""
-    maps: list[ShadowMap | None] = []
-    for face, seen in enumerate(receivers.faces()):
-        if not seen.any():
-            maps.append(None)
-            continue
-        axis = np.zeros(3)
-        axis[face // 2] = -1.0 if face % 2 else 1.0
-        maps.append(receivers.map(point, axis, 1.0, fineness, seen))
-    return tuple(maps)
+    return tuple(
+        receivers.map(point, frame, 1.0, fineness, seen) if len(seen) else None
+        for frame, seen in zip(_face_frames(), receivers.faces(), strict=True)
+    )
 
 
 def sun_maps(
@@ -193,6 +217,11 @@ def look_along(direction: Float64Array) -> Float64Array:
     x = np.array([1.0 + sign * z[0] * z[0] * a, sign * b, -sign * z[0]])
     y = np.array([b, sign + z[1] * z[1] * a, -z[1]])
     return np.stack([x, y, z], axis=1)
+
+
+@cache
+def _face_frames() -> tuple[Float64Array, ...]:
+    return tuple(look_along(axis) for axis in FACE_AXES)
 
 
 def _extent(receivers: Receivers, frame: Float64Array) -> float:

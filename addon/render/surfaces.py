@@ -12,24 +12,19 @@ from ..scene.arrays import Float32Array, Float64Array
 _BELOW_ONE = float(np.nextafter(1.0, 0.0))
 
 _UNIFORMITY = 1e-6
-"""How much the squared scales of a matrix may differ, relatively, where areas are those of the mesh times one of them."""
+"""Relative difference of a matrix's squared scales up to which all areas are as many times those of the mesh."""
 
 _ROUNDINGS = 64.0
-"""Roundings of float32 that separate a point from where the GPU puts its triangle: a sum of four products has 7, and
-light that leaves at a grazing angle meets a displaced triangle several times as far away."""
+"""Roundings of float32 that a light leaves out in front of it: a sum of four products has 7, and a triangle that is off
+by these is met several times as far away by light that leaves at a grazing angle."""
 
 
 class SlotSurface:
-    """The triangles (T, 3) of one slot of a mesh: rows of its `positions` (V, 3) float64, object space."""
+    """The triangles (T, 3) of one slot of a mesh, rows of its `positions` (V, 3) float32, in object space."""
 
     def __init__(self, mesh: Mesh, slot: SlotRange) -> None:
+        self.positions = mesh.positions
         self.triangles = mesh.triangles[slot.first : slot.first + slot.count]
-        self._mesh = mesh
-
-    @property
-    def positions(self) -> Float32Array:
-        """(V, 3) of the whole mesh."""
-        return self._mesh.positions
 
     def areas(self, linear: Float64Array) -> Float64Array:
         """(T,) m², where a matrix (3, 3) places them."""
@@ -38,43 +33,50 @@ class SlotSurface:
         (ax, ay, az), (bx, by, bz) = ((places[self.triangles[:, corner]] - first).T for corner in (1, 2))
         return 0.5 * np.sqrt((ay * bz - az * by) ** 2 + (az * bx - ax * bz) ** 2 + (ax * by - ay * bx) ** 2)
 
-    @cached_property
-    def whole(self) -> tuple[float, Float32Array]:
-        """Area in object space, and the share (T,) of it up to and including each triangle."""
-        return _shares(self.areas(np.eye(3)))
-
 
 class Surface:
-    """A slot's triangles where `matrix` (4, 4), world-from-object, places them. Works out only what it is asked for."""
+    """A slot's triangles in world space. Works out only what it is asked for.
 
-    def __init__(self, slot: SlotSurface, matrix: Float64Array) -> None:
-        self._slot = slot
+    `matrix` (4, 4): world-from-object. `similar`: the same surface in object space, where the matrix scales uniformly.
+    """
+
+    def __init__(self, slot: SlotSurface, matrix: Float64Array, similar: "Surface | None" = None) -> None:
+        self._slot, self._similar = slot, similar
         self._linear, self._translation = matrix[:3, :3], matrix[:3, 3]
-        self._mirrored = bool(np.linalg.det(self._linear) < 0.0)
+        determinant = float(np.linalg.det(self._linear))
+        self._mirrored, self._scale = determinant < 0.0, abs(determinant) ** (1.0 / 3.0)
+
+    def placed(self, matrix: Float64Array) -> "Surface":
+        """One in object space where `matrix` (4, 4), world-from-object, puts it."""
+        squared = matrix[:3, :3].T @ matrix[:3, :3]
+        scale = float(np.trace(squared)) / 3.0
+        uniform = np.abs(squared - scale * np.eye(3)).max() <= _UNIFORMITY * scale
+        return Surface(self._slot, matrix, self if uniform else None)
 
     @cached_property
     def area(self) -> float:
         """m²."""
-        if self._squared_scale is not None:
-            return self._squared_scale * self._slot.whole[0]
+        if self._similar is not None:
+            return self._scale**2 * self._similar.area
         return float(self._slot.areas(self._linear).sum())
 
     @cached_property
     def cumulative(self) -> Float32Array:
         """(T,) share of the area up to and including each triangle."""
-        if self._squared_scale is not None:
-            return self._slot.whole[1]
-        return _shares(self._slot.areas(self._linear))[1]
+        if self._similar is not None:
+            return self._similar.cumulative
+        sums = np.cumsum(self._slot.areas(self._linear))
+        return (sums / sums[-1]).astype(np.float32)
 
-    @cached_property
+    @property
     def center(self) -> Float64Array:
         """(3,) the mean point of its surface, world space."""
-        return self._placed(self._weights @ self._slot.positions.astype(np.float64))
+        return self._placed(self._shape[0])
 
-    @cached_property
+    @property
     def radius(self) -> float:
         """Of the ball about its centre that holds it, m."""
-        return float(np.linalg.norm(self._placed(self._corners) - self.center, axis=-1).max())
+        return self._shape[1]
 
     @cached_property
     def rounding(self) -> float:
@@ -82,7 +84,7 @@ class Surface:
 
         `_ROUNDINGS` of the products that place it about its object's origin: coordinates times matrix entries.
         """
-        products = np.abs(self._linear) @ np.abs(self._corners).max(axis=0)
+        products = np.abs(self._linear) @ self._shape[2]
         return _ROUNDINGS * float(np.finfo(np.float32).eps) * float(np.linalg.norm(products))
 
     def triangle(self, index: int) -> Float64Array:
@@ -102,31 +104,21 @@ class Surface:
         return a + root * (1.0 - u[1]) * (b - a) + root * u[1] * (c - a), normal / np.linalg.norm(normal)
 
     @cached_property
-    def _squared_scale(self) -> float | None:
-        """None where directions are scaled differently."""
-        squared = self._linear.T @ self._linear
-        scale = float(np.trace(squared)) / 3.0
-        return scale if np.abs(squared - scale * np.eye(3)).max() <= _UNIFORMITY * scale else None
+    def _shape(self) -> tuple[Float64Array, float, Float64Array]:
+        """Mean point (3,) in object space, radius (m) in world space, and greatest coordinates (3,) in object space.
 
-    @cached_property
-    def _weights(self) -> Float64Array:
-        """(V,) share of each vertex in the mean point; 0 where no triangle that has it is ever drawn from."""
+        Only of triangles that points may be on.
+        """
+        if self._similar is not None:
+            center, radius, greatest = self._similar._shape
+            return center, self._scale * radius, greatest
         shares = np.diff(self.cumulative.astype(np.float64), prepend=0.0)
-        return np.bincount(
-            self._slot.triangles.ravel(), np.repeat(shares / 3.0, 3), minlength=len(self._slot.positions)
-        )
-
-    @property
-    def _corners(self) -> Float64Array:
-        """(N, 3) the vertices that it has, object space."""
-        return self._slot.positions[self._weights > 0.0].astype(np.float64)
+        corners, count = self._slot.triangles.ravel(), len(self._slot.positions)
+        weights = np.bincount(corners, np.repeat(shares / 3.0, 3), count).astype(np.float64)
+        places = self._slot.positions.astype(np.float64)
+        center, places = weights @ places, places[weights > 0.0]
+        away = (places - center) @ self._linear.T
+        return center, float(np.sqrt((away**2).sum(axis=1).max())), np.abs(places).max(axis=0)
 
     def _placed(self, positions: Float64Array) -> Float64Array:
         return positions @ self._linear.T + self._translation
-
-
-def _shares(areas: Float64Array) -> tuple[float, Float32Array]:
-    """The sum of areas (T,), and the share of it up to and including each."""
-    cumulative = np.cumsum(areas)
-    total = float(cumulative[-1]) if len(cumulative) else 0.0
-    return total, (cumulative / (total or 1.0)).astype(np.float32)

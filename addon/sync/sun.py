@@ -41,7 +41,7 @@ def sun_disc(sky: Sky, size: float, color: Color, environment_from_world: Float6
     half = 0.5 * max(size, SMALLEST_SUN)
     # Radiance is irradiance over a solid angle that Cycles computes in single precision: that makes 0.15 % for the
     # sun's size, and a factor of 1.9 for the narrowest.
-    solid_angle = 2.0 * np.pi * (1.0 - float(np.cos(np.float32(half))))
+    solid_angle = 2.0 * np.pi * (1.0 - float(np.float32(np.cos(half))))
     lowest, highest = _edges(sky, half, solid_angle) * color
     setting = sky.before_5 and sky.sun_elevation <= half
     return SunDisc(

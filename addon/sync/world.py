@@ -165,7 +165,7 @@ def _pixels(shown: Field, frame: _Frame) -> Float32Array:
 
 
 def _suns(radiance: Field, name: str, black: World, evaluator: WorldEvaluator) -> tuple[tuple[Light, ...], World]:
-    """The suns of the skies in a world, as far as it is a sum of skies: lights, and `black` with the first one's disc."""
+    """The suns of the skies in a world, as far as it is their sum: lights, and `black` with the first one's disc."""
     shares = {id(part): share for part, share in linear_shares(radiance)}
     lights: list[Light] = []
     disc: SunDisc | None = None

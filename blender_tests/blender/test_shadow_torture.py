@@ -9,9 +9,11 @@ from agreement_fixtures import DIRECT_PASSES, render_pair
 from agreement_torture import TORTURE
 from engine_fixtures import registered_fixture  # noqa: F401
 
+GRAZING = "grazing sun over curved meshes"
+
 OUR_SAMPLES, CYCLES_SAMPLES = 256, 512
 FEW_SAMPLES = 64
-SHARP = ("grazing sun over curved meshes", "sun over a kilometre")
+SHARP = (GRAZING, "sun over a kilometre")
 """Their suns are as small as the real one: fewer samples show its penumbrae as well."""
 
 LEAK = 1e-3
@@ -20,7 +22,7 @@ LEAK = 1e-3
 BRIGHTEST_LEAKS = {
     # Faces of these waves are up to 3° from the smooth surface: at its terminator either of the two may be lit, at
     # sin 3° = 0.05 of the sun's 3 W/m². That is 0.9 of the mean of a picture that is hardly lit at all.
-    "grazing sun over curved meshes": 0.9,
+    GRAZING: 0.9,
 }
 """What the brightest such pixel may be instead, where faces and smooth normals differ."""
 
@@ -28,18 +30,20 @@ BRIGHTEST_LEAKS = {
 MEAN_LIMIT, OFF_LIMIT = 0.01, 0.02
 """Of `Difference`, as in all direct light."""
 
-LIMITS = {
-    # Cycles lifts shadow rays off smooth meshes (Geometry Offset, 0.1 as Blender has it), so that their faces do not
-    # show in the terminator. In this scene that is worth 0.5 % of the light and 2.5 % of the pixels, measured with and
-    # without; whoever shadows the true faces may differ by so much more.
-    "grazing sun over curved meshes": (MEAN_LIMIT + 0.005, OFF_LIMIT + 0.025),
-}
+DIM = 0.2
+DIM_OFF = 0.25
+"""Where less than a fifth of the light arrives, an error of 1 % of the light, two standard errors of 256 points at a
+straight edge, is above 5 % of what arrives. A quarter of such pixels may be off besides."""
+
+TERMINATOR = (0.005, 0.025)
+"""Cycles lifts shadow rays off smooth meshes (Geometry Offset, 0.1 by default), so that their faces do not show in
+the terminator. Under the grazing sun that is worth so much light and so many pixels, measured with and without: whoever
+shadows the true faces may differ by so much more."""
 
 
 @pytest.mark.usefixtures("registered")
 @pytest.mark.parametrize("name", TORTURE)
 def test_shadows_are_cycles(name: str, tmp_path: Path) -> None:
-    mean, off = LIMITS.get(name, (MEAN_LIMIT, OFF_LIMIT))
     pair = render_pair(
         TORTURE[name](),
         tmp_path,
@@ -50,6 +54,10 @@ def test_shadows_are_cycles(name: str, tmp_path: Path) -> None:
     ours, theirs = pair.reflected()
     dark = surrounded((theirs == 0.0).all(axis=-1)) & pair.covered
     found = pair.difference()
+    arriving = theirs.mean(axis=-1)[pair.covered] / np.percentile(theirs.mean(axis=-1)[pair.covered], 98.0)
+    mean, off = MEAN_LIMIT, OFF_LIMIT + DIM_OFF * float(((arriving > LEAK) & (arriving < DIM)).mean())
+    if name == GRAZING:
+        mean, off = mean + TERMINATOR[0], off + TERMINATOR[1]
     assert 0.01 < dark.mean() < 0.9, "the case must have a shadow"
     assert found.mean <= mean, pair.report(tmp_path)
     assert found.off <= off, pair.report(tmp_path)

@@ -131,9 +131,9 @@ def test_the_sun_of_a_sky():
     assert sun.emission == pytest.approx(tuple(0.75 * value for value in light_alone.emission))
     assert world.sun_disc.half_angle == pytest.approx(0.01)
     assert world.sun_disc.direction == pytest.approx(sun.world_from_light[:3, 2])
-    for radiance in ("lowest", "highest"):
-        expected = 0.75 * np.array(getattr(alone.sun_disc, radiance))
-        np.testing.assert_allclose(getattr(world.sun_disc, radiance), expected, rtol=1e-6)
+    for end in ("lowest", "highest"):
+        expected = 0.75 * np.array(getattr(alone.sun_disc, end))
+        np.testing.assert_allclose(getattr(world.sun_disc, end), expected, rtol=1e-6)
     assert texts == ()
 
 

@@ -45,6 +45,7 @@ def compose():
                     scene=builders.scene(builders.quad("q"), world=(9.0, 9.0, 9.0)),
                     settings=RenderSettings(WIDTH, HEIGHT, debug_view=view),
                     plan=SimpleNamespace(layers=1),
+                    sample=SimpleNamespace(index=0),
                     camera=builders.camera(),
                 )
                 composite.run(frame, planned)

@@ -292,6 +292,20 @@ def test_a_scene_without_casters_or_receivers_is_lit_and_empty(shared_session, k
     np.testing.assert_allclose(lit, bare, rtol=1e-5, err_msg="a floor shadows itself")
 
 
+@pytest.mark.parametrize("half", [1e3, 1e4, 1e6])
+def test_a_ground_to_the_horizon_does_not_shadow_itself(shared_session, half):
+    """Its corners are rounded to millimetres or decimetres, and its plane in the map is off by as much."""
+    direction = np.array([1.0, 0.1, -1.0]) / np.sqrt(2.01)
+    aside = np.cross([0.0, 1.0, 0.0], -direction) / np.linalg.norm(np.cross([0.0, 1.0, 0.0], -direction))
+    pose = builders.translation(z=2.0)
+    pose[:3, :3] = np.stack([aside, np.cross(-direction, aside), -direction], axis=1)
+    for kind in (LightKind.SUN, LightKind.SPOT):
+        light = replace(builders.light(kind, angle=0.8 * (kind is LightKind.SPOT)), world_from_light=pose)
+        scene = fresh(builders.scene(builders.quad("ground", half=half), lights=(light,)))
+        shares = shadow_of(shared_session, scene, builders.camera(z=6.0, half_width=0.05))
+        np.testing.assert_allclose(shares[~np.isnan(shares)], 1.0, rtol=1e-4)
+
+
 @pytest.mark.parametrize("samples", [1, 2])
 @pytest.mark.parametrize(
     ("kind", "radius"), [(LightKind.POINT, 0.0), (LightKind.POINT, 0.2), (LightKind.SPOT, 0.0), (LightKind.AREA, 0.0)]

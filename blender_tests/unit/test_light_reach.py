@@ -18,6 +18,7 @@ from addon.render.light_reach import (
     rounded_reach,
     sampled_reach,
 )
+from addon.render.memory import Memory
 from addon.scene import AreaShape, LightKind
 from blender_tests import builders
 
@@ -145,7 +146,7 @@ def left_out(lights, reaches, **changes):
     scene = builders.scene(builders.box("box"))
     scene = replace(scene, batches=tuple(replace(batch, **changes) for batch in scene.batches))
     camera = builders.camera(clip_end=10.0)
-    return dict(lights_out_of_reach(lights, np.array(reaches, np.float64), scene, camera))
+    return dict(lights_out_of_reach(lights, np.array(reaches, np.float64), scene, camera, Memory()))
 
 
 def test_lights_are_left_out_that_are_off_or_reach_nothing_in_the_picture():
@@ -167,6 +168,6 @@ def test_a_light_that_only_reaches_what_is_out_of_view_is_left_out():
     scene = builders.scene(builders.quad("seen"), builders.quad("unseen", center=(50.0, 0.0)))
     lamp = builders.light(position=(50.0, 0.0, 1.0))
     camera = builders.camera()
-    out = lights_out_of_reach([lamp], np.array([5.0]), scene, camera)
+    out = lights_out_of_reach([lamp], np.array([5.0]), scene, camera, Memory())
     assert [index for index, _ in out] == [0]
-    assert not lights_out_of_reach([lamp], np.array([60.0]), scene, camera)
+    assert not lights_out_of_reach([lamp], np.array([60.0]), scene, camera, Memory())

@@ -6,6 +6,7 @@ import pytest
 
 from addon.render.light_reach import MANY_LIGHTS
 from addon.render.lighting_plan import plan_lights
+from addon.render.memory import Memory
 from addon.render.plan import plan
 from addon.scene import EmissionSampling, LightKind, RenderSettings, Variant
 from blender_tests import builders
@@ -16,7 +17,7 @@ FLOOR = builders.quad("floor", half=5.0)
 
 def planned(scene, camera=None, *, continuous=False, **settings):
     """(plan, {name: reason} of what was left out)."""
-    lights, left_out = plan_lights(scene, replace(SETTINGS, **settings), camera, continuous=continuous)
+    lights, left_out = plan_lights(scene, replace(SETTINGS, **settings), camera, Memory(), continuous=continuous)
     return lights, dict(left_out)
 
 

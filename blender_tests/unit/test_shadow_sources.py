@@ -14,6 +14,7 @@ from addon.render.atlas import Slot
 from addon.render.light_reach import extent
 from addon.render.lighting import lamp_point, sun_direction
 from addon.render.lighting_plan import LightPlan
+from addon.render.memory import Memory
 from addon.render.mesh_lights import mesh_lights
 from addon.render.receivers import visible_receivers
 from addon.render.shadow_sources import shadow_sources
@@ -113,25 +114,23 @@ def is_lit(light, offset, point, points):
     return np.ones(len(points), np.bool_)
 
 
-def within_cone(source, points, point):
-    """Points (N, 3) in front of a lamp that has one perspective map, drawn to the square about its cone.
+def within_cone(light, points, point):
+    """Points (N, 3) in front of a spot, drawn to the square about its cone.
 
-    A spot with a radius lights some that are a little aside of that, as seen from its sampled point, for its cone is
+    One with a radius lights some that are a little aside of that, as seen from its sampled point, for its cone is
     asked for another direction. They have the nearest texel.
     """
-    frame = look_along(source.cone.axis)
+    frame = look_along(-light.world_from_light[:3, 2])
     view = (points - point) @ frame
     depth = np.maximum(-view[:, 2], 1e-9)
-    half = tan(max(source.cone.half_angle, NARROWEST))
+    half = tan(max(0.5 * light.angle, NARROWEST))
     across = np.clip(view[:, :2] / depth[:, None], -half, half)
     return np.column_stack([across * depth[:, None], -depth]) @ frame.T + point
 
 
 def looked_up(source, maps, point, points, origin):
     """(N,) whether `find_map` of `common/shadows.glsl` finds each point (N, 3) on a map; faces of a cube never ask."""
-    if source.center is not None and not source.is_cube:
-        points = within_cone(source, points, point)
-    rows = [None if item is None else shadow_row(item.camera, Slot(0, 0, 0, item.size), origin) for item in maps]
+    rows = [None if item is None else shadow_row(item.camera, Slot(0, 0, 0, item.size), origin, 0.0) for item in maps]
     relative = np.column_stack([points - origin, np.ones(len(points))])
     found = np.zeros(len(points), np.bool_)
     away = points - point
@@ -152,7 +151,7 @@ def looked_up(source, maps, point, points, origin):
     return found
 
 
-def assert_all_looked_up(camera, depths, source, point, lit, reach=inf):
+def assert_all_looked_up(camera, depths, source, point, lit, reach=inf, spot=None):
     """Every point of the picture that the light reaches is found on a map; returns how many there are."""
     _, height, width = depths.shape
     receivers = visible_receivers(tiles_of(depths), TILE, camera, (width, height), 2.0)
@@ -162,7 +161,8 @@ def assert_all_looked_up(camera, depths, source, point, lit, reach=inf):
         reached &= np.linalg.norm(points - source.center, axis=1) < reach
         reached &= np.linalg.norm(points - point, axis=1) > 1e-6 * np.abs(points).max()
     maps = source.maps(point, receivers, NO_CASTERS, LARGEST, reach)
-    found = looked_up(source, maps, point, points, camera.position)
+    asked = within_cone(spot, points, point) if spot and not source.is_cube else points
+    found = looked_up(source, maps, point, asked, camera.position)
     assert found[reached].all(), f"{(~found[reached]).sum()} of {reached.sum()} are beside {len(maps)} maps"
     for item in maps:
         if item is not None:
@@ -187,7 +187,8 @@ def test_what_a_lamp_shines_on_is_on_its_maps(kind, orthographic, limited, seed)
     point = lamp_point(light, offset)
     distance = np.linalg.norm(points - light.world_from_light[:3, 3], axis=1)
     reach = float(np.quantile(distance, generator.random())) if limited and kind is not LightKind.SUN else inf
-    assert_all_looked_up(camera, depths, source, point, lambda at: is_lit(light, offset, point, at), reach)
+    spot = light if kind is LightKind.SPOT else None
+    assert_all_looked_up(camera, depths, source, point, lambda at: is_lit(light, offset, point, at), reach, spot)
 
 
 @given(st.booleans(), SEEDS)
@@ -204,9 +205,9 @@ def test_what_an_emissive_surface_shines_on_is_on_its_maps(orthographic, seed):
     material = builders.material("glow", emission=(1, 1, 1))
     quad = builders.quad("q", center=generator.normal(size=2))
     batches = [builders.batch("q", [matrix], materials=("glow",))]
-    surfaces, _ = mesh_lights(builders.scene(quad, materials=(material,), batches=batches), 0.5)
+    surfaces, _ = mesh_lights(builders.scene(quad, materials=(material,), batches=batches), 0.5, Memory())
     (source,) = shadow_sources(LightPlan((), surfaces, casts_shadows=True))
-    point, _ = surfaces[0].point(generator.random(2))
+    point, _ = surfaces[0].surface.point(generator.random(2))
     assert_all_looked_up(camera, depths, source, point, lambda at: np.ones(len(at), np.bool_))
 
 
@@ -233,7 +234,7 @@ def test_each_light_that_casts_shadows_has_a_source():
     material = builders.material("glow", emission=(1, 1, 1))
     quad = builders.quad("q")
     batches = [builders.batch("q", materials=("glow",))]
-    surfaces, _ = mesh_lights(builders.scene(quad, materials=(material,), batches=batches), 0.5)
+    surfaces, _ = mesh_lights(builders.scene(quad, materials=(material,), batches=batches), 0.5, Memory())
     sources = shadow_sources(LightPlan(lamps, surfaces, (inf,) * len(lamps), world_directions=2, casts_shadows=True))
     assert [source.index for source in sources] == [0, 1, 3, 4, 5, 6, 7, 8]
     point, sun, spot, area, wide, surface, *world = sources

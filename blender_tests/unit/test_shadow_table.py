@@ -28,7 +28,7 @@ def test_a_row_projects_as_its_camera_does(orthographic, power, seed):
     view = np.column_stack([across * (1.0 if orthographic else depth[:, None]), -depth])
     points = view @ camera.rotation.T + camera.position
     origin = camera.position + generator.normal(size=3) * 5.0
-    row = shadow_row(camera, slot, origin)
+    row = shadow_row(camera, slot, origin, 50.0)
     assert row.dtype == np.float32
     assert row.shape == (TEXELS_PER_MAP, 4)
     mapped = np.column_stack([points - origin, np.ones(50)]) @ row[:4].astype(np.float64).T
@@ -39,6 +39,7 @@ def test_a_row_projects_as_its_camera_does(orthographic, power, seed):
     assert row[4].tolist() == [slot.x, slot.y, size, 3]
     assert row[5, 0] == pytest.approx((right - left) / size)
     assert bool(row[5, 1]) == orthographic
+    assert row[5, 2] == 50.0
 
 
 def test_an_empty_row_has_no_size():

@@ -243,3 +243,35 @@ def test_a_light_on_what_is_seen_or_far_from_it_has_finite_maps(offset):
             assert 0.0 < item.camera.clip_start < item.camera.clip_end
     (sun,) = sun_maps(unit(np.random.default_rng(0)), receivers, NO_CASTERS, Fineness(64), 1)
     assert np.isfinite([*sun.camera.window, sun.camera.clip_end]).all()
+
+
+@given(st.booleans(), SEEDS)
+def test_a_face_is_asked_for_nothing_that_is_wholly_beside_it(orthographic, seed):
+    """What it may see are the tiles whose corners are not all beyond one of its sides, with room for the extent."""
+    generator = np.random.default_rng(seed)
+    camera = any_camera(generator, orthographic=orthographic)
+    receivers = receivers_of(camera, picture(generator, 1, 60, 60, empty=0.9))
+    if receivers.count == 0:
+        return
+    center = receivers.corners[0, 0] + generator.normal(size=3) * 10.0 ** generator.uniform(-2.0, 2.0)
+    extent = 10.0 ** generator.uniform(-3.0, 1.0)
+    corners = receivers.corners - center
+    faces = LocalReceivers(receivers, center, extent, EVERYWHERE, inf).faces()
+    for face, seen in enumerate(faces):
+        axis, sign = face // 2, 1.0 - 2.0 * (face % 2)
+        ahead = sign * corners[..., axis] + 2.0 * extent
+        sides = np.delete(corners, axis, axis=-1)
+        beside = [(ahead < way * sides[..., other]).all(axis=1) for other in range(2) for way in (1.0, -1.0)]
+        expected = ~np.logical_or.reduce(beside) & (ahead > 0.0).any(axis=1)
+        np.testing.assert_array_equal(seen, np.flatnonzero(expected))
+
+
+@pytest.mark.parametrize("nearest", [0.0, 0.3, 50.0])
+def test_maps_begin_where_the_light_says(nearest):
+    receivers = receivers_of(builders.camera(z=0.0), np.full((1, 40, 40), 5.0, np.float32))
+    local = LocalReceivers(receivers, np.zeros(3), 0.1, EVERYWHERE, inf, nearest)
+    for item in cube_maps(np.zeros(3), local, Fineness(LARGEST)):
+        if item is not None:
+            assert 0.0 < item.camera.clip_start < item.camera.clip_end
+            assert item.camera.clip_start >= nearest
+            assert item.camera.clip_end >= local.farthest

@@ -154,13 +154,13 @@ float spread_factor(Light light, float cosine)
 /**
  * Solid angle (sr) that an area (m²) seen from a squared distance (m²) at a cosine seems to have by one point of it.
  *
- * Within four radii of the patch that the point stands for, its radius is taken into account: right above its middle
+ * Within √2 radii of the patch that the point stands for, its radius is taken into account: right above its middle
  * exactly (a disk's π r²/(d² + r²)), elsewhere so that the sum over points stays finite however near the surface is.
  */
 float patch_solid_angle(float area, float share, float distance_squared, float cosine)
 {
     float radius_squared = area * share / PI;
-    float near = radius_squared * clamp(1.0 - distance_squared / (16.0 * max(radius_squared, 1e-30)), 0.0, 1.0);
+    float near = radius_squared * clamp(1.0 - distance_squared / (2.0 * max(radius_squared, 1e-30)), 0.0, 1.0);
     float height_squared = cosine * cosine * distance_squared;
     float softened = distance_squared + near;
     return area * sqrt((height_squared + near) / softened) / softened;

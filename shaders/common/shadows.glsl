@@ -23,6 +23,7 @@ struct ShadowMap
     int page;
     float texel;        // width at distance 1, orthographic: m
     bool orthographic;
+    float extent;       // m from where it is seen from to the farthest corner of what casts shadows on it
 };
 
 /** A receiver: where it is, its unit normal, and how exactly its position is known, m. */
@@ -40,7 +41,7 @@ ShadowMap fetch_shadow_map(int index)
     vec4 optics = texelFetch(shadow_table, first + ivec2(5, 0), 0);
     return ShadowMap(texelFetch(shadow_table, first, 0), texelFetch(shadow_table, first + ivec2(1, 0), 0),
                      texelFetch(shadow_table, first + ivec2(2, 0), 0), texelFetch(shadow_table, first + ivec2(3, 0), 0),
-                     place.xy, place.z, int(place.w), optics.x, optics.y > 0.0);
+                     place.xy, place.z, int(place.w), optics.x, optics.y > 0.0, optics.z);
 }
 
 /** Texel x, y of the map's page, and nearness: 1/z in perspective maps, z_end - z in orthographic ones. */
@@ -74,11 +75,11 @@ float nearness_of(ShadowMap map, float nearness, float metres)
 /**
  * How far, as a difference of nearness, a receiver may seem nearer or farther than it is.
  *
- * Its place is off by `precision_along_view` and by rounding; light at a small angle makes more of it.
+ * Its place is off by `precision_along_view` and by rounding, as casters' planes are by that of their vertices; light at a small angle makes more of it.
  */
 float receiver_tolerance(ShadowMap map, Receiver receiver, float nearness, float n_dot_l)
 {
-    float place = receiver.precision_along_view + POSITION_EPSILON * length(receiver.position);
+    float place = receiver.precision_along_view + POSITION_EPSILON * (length(receiver.position) + map.extent);
     float rounding = map.orthographic ? abs(map.row_nearness.w) + nearness : nearness;
     return nearness_of(map, nearness, place / max(n_dot_l, 0.02)) + POSITION_EPSILON * rounding;
 }

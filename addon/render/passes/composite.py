@@ -63,7 +63,8 @@ class CompositePass:
         """Add one sample to the film."""
         spec = _program(planned.defines)
         # A preview is only shown until there is something better: the world shines through walls in it.
-        over = frame.lighting.plan.preview and frame.sample.index == 1
+        lit = any(name.startswith("direct.") for name in planned.reads)
+        over = lit and frame.lighting.plan.preview and frame.sample.index == 1
         framebuffer = frame.pool.framebuffer(tuple((target.name, 0) for target in planned.writes))
         frame.film.begin_sample(framebuffer, over=over)
         self._fullscreen.bind(frame, spec, planned)

@@ -50,10 +50,12 @@ _VIEW_BINDING, _MATERIAL_BINDING = 0, 1
 
 @dataclass(frozen=True)
 class _View:
-    """A map with the indices of the casters that it sees. Equal keys are equal maps, whenever they are drawn."""
+    """A map with the indices of the casters that it sees, none of which has a corner farther from its camera than
+    `extent` (m). Equal keys are equal maps, whenever they are drawn."""
 
     shadow_map: ShadowMap
     seen: Int64Array
+    extent: float
     key: Hashable
 
 
@@ -221,7 +223,7 @@ class ShadowMapsPass:
                 place = view.key, slots[view.key]
                 row = held.get(place)
                 if row is None:
-                    row = shadow_row(view.shadow_map.camera, slots[view.key], frame.view.position)
+                    row = shadow_row(view.shadow_map.camera, slots[view.key], frame.view.position, view.extent)
                 self._rows[place] = row
                 rows.append(row)
         image = as_texels(np.stack(rows))
@@ -246,7 +248,9 @@ def _view(shadow_map: ShadowMap | None, casters: Casters, blocker_groups: int) -
         return None
     pose = camera.world_from_camera.tobytes()
     optics = (camera.window, camera.clip_start, camera.clip_end, camera.orthographic)
-    return _View(shadow_map, seen, (pose, optics, shadow_map.size, casters.versions[seen].tobytes()))
+    farthest = np.abs(casters.bounds[seen] - camera.position).max(axis=1)
+    extent = float(np.linalg.norm(farthest, axis=-1).max())
+    return _View(shadow_map, seen, extent, (pose, optics, shadow_map.size, casters.versions[seen].tobytes()))
 
 
 def _program(defines: frozenset[str]) -> ProgramSpec:
