@@ -70,6 +70,7 @@ def main(output: str, width: str, height: str) -> None:
         for name, build in cases().items():
             samples = NOISY_SAMPLES if name.startswith(NOISY) else CYCLES_SAMPLES
             figures[name] = measured(build, samples, (int(width), int(height)), Path(folder))
+            figures[name]["own_limits"] = name in TORTURE
             print(f"{name}: {figures[name]}", flush=True)
             Path(output).write_text(json.dumps(figures), encoding="utf-8")
     addon.unregister()

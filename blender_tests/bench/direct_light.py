@@ -33,15 +33,15 @@ def main(arguments: list[str]) -> int:
         output = Path(folder) / "figures.json"
         in_blender(JOB, str(output), str(WIDTH), str(HEIGHT))
         figures = json.loads(output.read_text(encoding="utf-8"))
-    missed = [
-        name for name, entry in figures.items() if not (entry["mean"] <= MEAN_LIMIT and entry["off"] <= OFF_LIMIT)
-    ]
+    judged = {name: entry for name, entry in figures.items() if not entry["own_limits"]}
+    missed = [name for name, entry in judged.items() if not (entry["mean"] <= MEAN_LIMIT and entry["off"] <= OFF_LIMIT)]
     text = table(HEADER, [row(name, entry) for name, entry in figures.items()])
     text += (
         f"\n`python3 build.py bench {NAME}`: {WIDTH}×{HEIGHT}, 256 samples of ours; diffuse and glossy light straight "
         "from lamps and world, with shadows. Mean error: Σ|ours − Cycles| / Σ Cycles. Pixels off: a channel differs "
         f"by more than 5 % and by more than 1 % of the picture's mean. Limits: {MEAN_LIMIT:.0%} and {OFF_LIMIT:.0%}, "
-        f"missed in {len(missed)} of {len(figures)} cases (bold). Noise: of Cycles' picture, from its two halves. "
+        f"missed in {len(missed)} of {len(judged)} cases (bold). The last {len(figures) - len(judged)}, where shadow "
+        "maps fail, have limits of their own in test_shadow_torture.py. Noise: of Cycles' picture, from its halves. "
         f"Machine: {machine()}.\n"
     )
     report(NAME, "Direct light against Cycles", text)

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from addon.scene import (
     BaseColorSource,
     Camera,
+    EmissionSampling,
     ImageTexture,
     InstanceBatch,
     Interpolation,
@@ -24,6 +25,13 @@ from blender_tests import builders
 
 ASPECT = 2 / 3
 """Height over width of the pictures that `random_camera` is for."""
+
+
+LIGHTS = (
+    builders.light(position=(1.0, 2.0, 3.0), casts_shadow=False),
+    builders.light(LightKind.SUN, emission=(1.0, 1.0, 1.0), casts_shadow=False),
+)
+"""Without shadows, whose maps are fitted to what all layers show: a pixel's light depends on what is there alone."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +121,9 @@ def furnished(scene: Scene, generator: np.random.Generator) -> Scene:
         matrix[:3, 3] = generator.uniform(-2.0, 2.0, 3)
     texture = ImageTexture("pierced", interpolation=Interpolation.CLOSEST)
     leaf = builders.material("leaf", source=BaseColorSource.TEXTURE, texture=texture, texture_alpha=True)
-    glow = builders.material("glow", emission=(0.25, 2.0, 0.5), roughness=0.25, specular=0.04)
+    glow = builders.material(
+        "glow", emission_sampling=EmissionSampling.NONE, emission=(0.25, 2.0, 0.5), roughness=0.25, specular=0.04
+    )
     batches = [replace(item, materials=("glow",)) if item.mesh == "soup 0" else item for item in scene.batches]
     return fresh(
         replace(
@@ -122,7 +132,7 @@ def furnished(scene: Scene, generator: np.random.Generator) -> Scene:
             materials={**scene.materials, "leaf": leaf, "glow": glow},
             images={"pierced": builders.pierced(generator)},
             batches=(*batches, numbered("leaf", matrices, 2000, "leaf")),
-            lights=(builders.light(position=(1.0, 2.0, 3.0)), builders.light(LightKind.SUN, emission=(1.0, 1.0, 1.0))),
+            lights=LIGHTS,
         )
     )
 
