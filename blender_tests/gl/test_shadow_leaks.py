@@ -71,7 +71,7 @@ def leaked(session, light, look, samples):
     look=st.sampled_from(CORNERS),
 )
 def test_no_sun_shines_into_a_closed_room(shared_session, azimuth, quarter, elevation, below, look):
-    """From wherever it comes, but for along a wall: a sheet seen edge on covers nothing, nor the half texel beside it."""
+    """From anywhere but along a wall: a sheet seen edge on covers nothing, nor the half texel beside it."""
     azimuth, elevation = azimuth + 0.5 * np.pi * quarter, -elevation if below else elevation
     direction = (np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), -np.sin(elevation))
     assert leaked(shared_session, sun(direction), look, samples=4) <= LEAK

@@ -141,7 +141,7 @@ KINDS = {
 def wrong_pixels(session, moments, settings, variant, *, continuous):
     """How many pixels of layer 1 of the last moment differ from Two-pass; layer 0 must not."""
     last = moments[-1]
-    expected = session.show(last.scene, last.camera, **settings)
+    expected = session.show(last.scene, last.camera, VIEWPORT if continuous else None, **settings)
     if continuous:
         view = session.play(moments, variant=variant, **settings)[-1]
     else:

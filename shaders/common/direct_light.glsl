@@ -122,7 +122,7 @@ Reflected lit_by_point(int index, Light light, LightPoint point, Shading shading
     weight *= light_reach_weight(index, dot(to_light, to_light));
 #endif
 #ifdef SHADOWS
-    if (point.shadow_count != 0) {
+    if (point.shadow_count != 0 && n_dot_l > 0.0 && weight != vec3(0.0)) {
         Receiver receiver = Receiver(shading.position, shading.normal, shading.precision_along_view);
         weight *= point_visibility(point, light_origin(light, point), receiver, n_dot_l);
     }

@@ -152,10 +152,12 @@ const float CONTACT = 2.0;
 // Cosine of the least angle between the faces of a crease, Blender's for shading smooth by angle: 30 degrees.
 const float CREASE_COSINE = 0.866;
 
-/** Unit normal, in a map's own axes, of a plane whose nearness changes so per texel. */
-vec3 map_normal(ShadowMap map, float nearness, vec2 gradient)
+/** Whether two planes with these slopes in a map meet at an angle. */
+bool is_crease(vec2 slope, vec2 other)
 {
-    return normalize(vec3(-gradient / slope_unit(map.orthographic, nearness, map.texel), 1.0));
+    float along = 1.0 + dot(slope, other);
+    float lengths = (1.0 + dot(slope, slope)) * (1.0 + dot(other, other));
+    return along < 0.0 || along * along < CREASE_COSINE * CREASE_COSINE * lengths;
 }
 
 /**
@@ -169,7 +171,7 @@ bool is_hidden(ShadowMap map, ivec2 nearest, vec3 point, vec2 gradient, float to
     float texel_depth = nearness_of(map, point.z, map.texel * distance);
     ivec2 first = texel_of(map, point.xy - 0.5);
     ivec2 last = texel_of(map, vec2(first) + 1.5);
-    vec3 normal = map_normal(map, point.z, gradient);
+    vec2 slope = gradient / slope_unit(map.orthographic, point.z, map.texel);
     bool hidden = false;
     for (int index = 0; index < 4; ++index) {
         ivec2 texel = ivec2(index % 2 == 0 ? first.x : last.x, index / 2 == 0 ? first.y : last.y);
@@ -177,7 +179,7 @@ bool is_hidden(ShadowMap map, ivec2 nearest, vec3 point, vec2 gradient, float to
         vec3 caster = fetch_caster(map, texel);
         float before = caster.x + dot(caster.yz, offset) - point.z;
         bool meets = before < CONTACT * (texel_depth + abs(caster.y) + abs(caster.z))
-                     && dot(map_normal(map, caster.x, caster.yz), normal) < CREASE_COSINE;
+                     && is_crease(caster.yz / slope_unit(map.orthographic, caster.x, map.texel), slope);
         hidden = hidden || ((texel == nearest || meets) && hides(caster, offset, point.z, gradient, tolerance));
     }
     return hidden;
