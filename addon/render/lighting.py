@@ -30,7 +30,8 @@ class Lighting:
 
     After `begin_sample`: `points` (L, 3) float64, where in world space each lamp and surface is sampled, for a sun and
     the world the direction towards it; `numbers` (L,): equal ones are equal points. `preview`: whether this sample
-    shows lamps whole. `sample_count`: how many samples of the film do not. Texels 0.w and 1.w of `samples` (L, 3, 4) are for the shadow maps' pass to fill.
+    shows lamps whole. `sample_count`: how many samples of the film do not. Texels 0.w and 1.w of `samples` (L, 3, 4)
+    are for the shadow maps' pass to fill.
     """
 
     def __init__(self, device: Device) -> None:

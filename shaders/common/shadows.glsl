@@ -163,8 +163,9 @@ bool is_crease(vec2 slope, vec2 other)
 /**
  * Whether the caster in texel `nearest` hides a receiver, or one in the four texels about it that it meets in a crease.
  *
- * Beside a crease the nearest texel may be beyond the other surface's edge: what covers the receiver is in the next one.
- * A caster farther off does not count there, so that edges of ordinary shadows stay where they are.
+ * Beside a crease the nearest texel may be beyond the other surface's edge, where the light goes on behind the receiver:
+ * what covers it is in the next texel. Where the nearest one shows the receiver itself, or the caster is farther off,
+ * that does not count: edges of ordinary shadows stay where they are. Without a nearest texel (below 0) all count.
  */
 bool is_hidden(ShadowMap map, ivec2 nearest, vec3 point, vec2 gradient, float tolerance, float distance)
 {
@@ -172,17 +173,22 @@ bool is_hidden(ShadowMap map, ivec2 nearest, vec3 point, vec2 gradient, float to
     ivec2 first = texel_of(map, point.xy - 0.5);
     ivec2 last = texel_of(map, vec2(first) + 1.5);
     vec2 slope = gradient / slope_unit(map.orthographic, point.z, map.texel);
-    bool hidden = false;
+    bool hidden = false, beyond = nearest.x < 0, covered = false;
     for (int index = 0; index < 4; ++index) {
         ivec2 texel = ivec2(index % 2 == 0 ? first.x : last.x, index / 2 == 0 ? first.y : last.y);
         vec2 offset = point.xy - (vec2(texel) + 0.5);
         vec3 caster = fetch_caster(map, texel);
-        float before = caster.x + dot(caster.yz, offset) - point.z;
-        bool meets = before < CONTACT * (texel_depth + abs(caster.y) + abs(caster.z))
+        float change = dot(caster.yz, offset);
+        bool hides_it = hides(caster, offset, point.z, gradient, tolerance);
+        bool meets = caster.x + change - point.z < CONTACT * (texel_depth + abs(caster.y) + abs(caster.z))
                      && is_crease(caster.yz / slope_unit(map.orthographic, caster.x, map.texel), slope);
-        hidden = hidden || ((texel == nearest || meets) && hides(caster, offset, point.z, gradient, tolerance));
+        if (texel == nearest) {
+            hidden = hides_it;
+            beyond = caster.x + max(change, dot(gradient, offset)) < point.z - tolerance;
+        }
+        covered = covered || (meets && hides_it);
     }
-    return hidden;
+    return hidden || (beyond && covered);
 }
 
 /** 1 where light from a sampled point (`origin`; of distant light unused) arrives, else 0. */
