@@ -8,7 +8,12 @@ import numpy as np
 from ..scene import Camera, EmissionSampling, Light, RenderSettings, Scene
 from .light_reach import MANY_LIGHTS, extent, farthest_reach, full_reach, lights_out_of_reach, peak_intensity
 from .memory import Memory
-from .mesh_lights import MeshLight, mesh_lights
+from .mesh_lights import GREATEST_COUNT, MeshLight, mesh_lights
+
+
+_NOT_WORTH_IT = (
+    f"too faint to be sampled as a light, or not among the {GREATEST_COUNT} strongest; left to indirect light"
+)
 
 
 @dataclass(frozen=True)
@@ -49,15 +54,8 @@ def plan_lights(
     lights = _lights_in_reach(scene, settings, camera, memory, left_out)
     surfaces, dim = mesh_lights(scene, settings.alpha_threshold, memory)
     memory.forget_unused()
-    left_out += [
-        (f"light of {light.name}", "too faint to be sampled as a light; left to indirect light") for light in dim
-    ]
-    unmarked = any(
-        material.is_emissive and material.emission_sampling is EmissionSampling.NONE
-        for material in scene.materials.values()
-    )
-    if unmarked:
-        left_out.append(("light of emissive materials", "their Emission Sampling is None; left to indirect light"))
+    left_out += [(f"light of {light.name}", _NOT_WORTH_IT) for light in dim]
+    left_out += _unsampled_emission(scene)
     casts = any(light.casts_shadow for light in lights) or bool(surfaces) or scene.world.shines
     casters = any(batch.casts_shadow for batch in scene.batches)
     intensities = np.array([peak_intensity(light) for light in lights])
@@ -72,6 +70,23 @@ def plan_lights(
         casts_shadows=casts and casters,
     )
     return planned, left_out
+
+
+def _unsampled_emission(scene: Scene) -> list[tuple[str, str]]:
+    """(name, reason) of emissive surfaces that are not even looked at as lights."""
+    emissive = [material for material in scene.materials.values() if material.is_emissive]
+    unsampled = [material for material in emissive if material.emission_sampling is EmissionSampling.NONE]
+    pierced = [material for material in emissive if material.is_alpha_tested and material not in unsampled]
+    found = [(f"light of {item.name}", "its Emission Sampling is None; left to indirect light") for item in unsampled]
+    found += [(f"light of {item.name}", "an image cuts it out; left to indirect light") for item in pierced]
+    glowing = {item.key for item in emissive if item.emission_sampling is EmissionSampling.AUTO} - {
+        item.key for item in pierced
+    }
+    for batch in scene.batches:
+        if batch.count > GREATEST_COUNT + 1 and glowing.intersection(batch.materials):
+            more = batch.count - GREATEST_COUNT - 1
+            found.append((f"light of {more} more instances of {scene.meshes[batch.mesh].name}", _NOT_WORTH_IT))
+    return found
 
 
 def _lights_in_reach(

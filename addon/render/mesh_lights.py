@@ -47,7 +47,8 @@ def mesh_lights(scene: Scene, alpha_threshold: float, memory: Memory) -> tuple[M
     """The emissive surfaces worth sampling, strongest first, and those that are left to indirect light.
 
     Those whose material is marked for it come whatever their share; of a batch's others only the largest instances are
-    considered. What has less alpha than `alpha_threshold` is not there.
+    considered. What has less alpha than `alpha_threshold` is not there; where an image
+    decides that, it is not known where the surface is.
     """
     return memory.recall(("mesh lights", alpha_threshold), (scene,), lambda: _chosen(scene, alpha_threshold, memory))
 
@@ -68,7 +69,7 @@ def _candidates(scene: Scene, alpha_threshold: float, memory: Memory) -> Iterato
         mesh = scene.meshes[batch.mesh]
         for slot in mesh.slots:
             material = scene.materials[batch.materials[min(slot.slot, len(batch.materials) - 1)]]
-            shines = material.is_emissive and material.alpha >= alpha_threshold
+            shines = material.is_emissive and material.alpha >= alpha_threshold and not material.is_alpha_tested
             if shines and material.emission_sampling is not EmissionSampling.NONE:
                 yield from _instances(batch, mesh, slot, material, memory)
 

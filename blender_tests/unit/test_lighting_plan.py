@@ -8,7 +8,7 @@ from addon.render.light_reach import MANY_LIGHTS
 from addon.render.lighting_plan import plan_lights
 from addon.render.memory import Memory
 from addon.render.plan import plan
-from addon.scene import EmissionSampling, LightKind, RenderSettings, Variant
+from addon.scene import BaseColorSource, EmissionSampling, ImageTexture, LightKind, RenderSettings, Variant
 from blender_tests import builders
 
 SETTINGS = RenderSettings(32, 32, samples=4)
@@ -132,9 +132,33 @@ def test_emissive_surfaces_that_are_not_sampled_are_named():
     batches = [builders.batch(quad.key, materials=("none" if quad.key == "none" else "glow",)) for quad in quads]
     lights, left_out = planned(builders.scene(*quads, materials=(glow, none), batches=batches))
     assert [light.name for light in lights.mesh_lights] == ["large (glow)"]
-    assert set(left_out) == {"light of small (glow)", "light of emissive materials"}
+    assert set(left_out) == {"light of small (glow)", "light of none"}
 
 
 def test_every_light_stays_where_the_camera_may_be_anywhere():
     scene = builders.scene(FLOOR, lights=(*lamps(2), builders.light(LightKind.SUN, emission=(0, 0, 0))))
     assert len(planned(scene, None)[0].lights) == 3
+
+
+def test_emission_that_is_not_sampled_is_told():
+    """Cut out by an image, switched off, or one of too many instances: each is named with its reason."""
+    pierced = builders.material("pierced", emission=(1.0, 1.0, 1.0), texture_alpha=True)
+    pierced = replace(pierced, source=BaseColorSource.TEXTURE, texture=ImageTexture("image"))
+    dark = builders.material("dark", emission=(1.0, 1.0, 1.0), emission_sampling=EmissionSampling.NONE)
+    bulb = builders.material("bulb", emission=(1.0, 1.0, 1.0))
+    many = [builders.translation(x=float(index)) for index in range(100)]
+    scene = builders.scene(
+        builders.quad("q"),
+        materials=(pierced, dark, bulb),
+        batches=[
+            builders.batch("q", materials=("pierced",), key="a"),
+            builders.batch("q", materials=("dark",), key="b"),
+            builders.batch("q", many, materials=("bulb",), key="c"),
+        ],
+    )
+    planned = plan(scene, RenderSettings(32, 32))
+    reasons = {left.name: left.reason for left in planned.left_out}
+    assert len(planned.lights.mesh_lights) == 16
+    assert "image" in reasons["light of pierced"]
+    assert "Emission Sampling" in reasons["light of dark"]
+    assert "strongest" in reasons["light of 83 more instances of q"]

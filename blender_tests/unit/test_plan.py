@@ -81,7 +81,7 @@ def test_emission_and_world_are_compiled_only_where_there_are_any():
     glow = builders.material(emission=(1.0, 0, 0), emission_sampling=EmissionSampling.NONE)
     planned = plan(builders.scene(builders.quad("q"), materials=(glow,)), SETTINGS)
     assert planned.find("direct").defines == {"EMISSION"}
-    assert "Emission Sampling" in reasons(planned)["light of emissive materials"]
+    assert "Emission Sampling" in reasons(planned)["light of white"]
     assert "gbuffer normal" in reasons(planned)
 
 
