@@ -97,11 +97,6 @@ def as_texels(rows: Float32Array) -> Float32Array:
     return image.reshape(height, LIGHTS_PER_ROW * texels, 4)
 
 
-def light_table(lights: Sequence[Light], origin: Float64Array) -> Float32Array:
-    """(rows, 256 · 7, 4) float32: the image of `light_rows`."""
-    return as_texels(light_rows(lights, origin))
-
-
 def _group_words(groups: int) -> tuple[float, ...]:
     """64 bits as four numbers that float32 holds exactly."""
     return tuple(float(groups >> shift & 0xFFFF) for shift in (0, 16, 32, 48))

@@ -10,7 +10,6 @@ from .light_reach import MANY_LIGHTS, extent, farthest_reach, full_reach, lights
 from .memory import Memory
 from .mesh_lights import GREATEST_COUNT, MeshLight, mesh_lights
 
-
 _NOT_WORTH_IT = (
     f"too faint to be sampled as a light, or not among the {GREATEST_COUNT} strongest; left to indirect light"
 )

@@ -5,7 +5,7 @@ import moderngl
 import numpy as np
 
 from addon.render import gl_thread
-from addon.render.light_table import LIGHTS_PER_ROW, TEXELS_PER_LIGHT, TEXELS_PER_SAMPLE, light_table
+from addon.render.light_table import LIGHTS_PER_ROW, TEXELS_PER_LIGHT, TEXELS_PER_SAMPLE, as_texels, light_rows
 from addon.render.programs import ProgramSpec
 
 WIDTH = 256
@@ -26,7 +26,7 @@ def _evaluate(device, includes, body, inputs, defines, lights):
     textures = {name: _texture(device, values, height) for name, values in inputs.items()}
     tables = {"ggx_albedo_table": device.ggx_albedo, "ltc_table": device.ltc}
     if lights:
-        rows = light_table(tuple(lights), np.zeros(3))
+        rows = as_texels(light_rows(tuple(lights), np.zeros(3)))
         textures["light_table"] = device.context.texture((rows.shape[1], rows.shape[0]), 4, rows, dtype="f4")
         textures["light_table"].filter = (moderngl.NEAREST, moderngl.NEAREST)
     declarations = "".join(
