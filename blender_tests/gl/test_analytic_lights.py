@@ -197,8 +197,7 @@ def test_a_rough_diffuse_surface_reflects_a_light_as_its_brdf_says_of_the_centre
         Surface surface = make_surface(color.rgb, 0.0, 0.0, 1.0, material.z, dot(normal.xyz, view.xyz));
         Light light = fetch_light(0);
         vec3 whole = analytic_diffuse(light, surface, place.xyz, normal.xyz, view.xyz);
-        LightPoint center;
-        center.offset = vec3(0);
+        LightPoint center = LightPoint(vec3(0), vec3(0), 0, 0, false, 0.0);
         LightSample point = sample_light(light, place.xyz, center);
         vec3 sampled = point.weight * diffuse_brdf_cosine(surface, normal.xyz, view.xyz, point.direction);
         return vec4(whole / sampled, 0);
