@@ -34,12 +34,12 @@ def render(scene: bpy.types.Scene, folder: Path) -> tuple[dict[str, np.ndarray],
 
 
 def assert_good_picture(channels: dict[str, np.ndarray]) -> None:
-    """Finite everywhere, and the plane in the lower half is there and lit."""
+    """Finite everywhere, and the plane in the lower half is there and lit, but for a shadow on less than half of it."""
     for name, pixels in channels.items():
         assert np.isfinite(pixels).all(), f"{name} is not finite"
     red = next(pixels for name, pixels in channels.items() if name.endswith("Combined.R"))
     depth = next(pixels for name, pixels in channels.items() if name.endswith("Depth.Z"))
-    assert (red[-4:] > 0.01).all(), "the good plane must be lit"
+    assert (red[-4:] > 0.01).mean() > 0.5, "the good plane must be lit"
     assert (depth[-4:] < 1e9).all(), "the good plane must be there"
 
 
