@@ -149,16 +149,6 @@ ivec2 texel_of(ShadowMap map, vec2 point)
 
 // Texels within which a caster must come to a receiver that it meets in a crease.
 const float CONTACT = 2.0;
-// Cosine of the least angle between the faces of a crease, Blender's for shading smooth by angle: 30 degrees.
-const float CREASE_COSINE = 0.866;
-
-/** Whether two planes with these slopes in a map meet at an angle. */
-bool is_crease(vec2 slope, vec2 other)
-{
-    float along = 1.0 + dot(slope, other);
-    float lengths = (1.0 + dot(slope, slope)) * (1.0 + dot(other, other));
-    return along < 0.0 || along * along < CREASE_COSINE * CREASE_COSINE * lengths;
-}
 
 /**
  * Whether the caster in texel `nearest` hides a receiver, or one in the four texels about it that it meets in a crease.
@@ -172,7 +162,6 @@ bool is_hidden(ShadowMap map, ivec2 nearest, vec3 point, vec2 gradient, float to
     float texel_depth = nearness_of(map, point.z, map.texel * distance);
     ivec2 first = texel_of(map, point.xy - 0.5);
     ivec2 last = texel_of(map, vec2(first) + 1.5);
-    vec2 slope = gradient / slope_unit(map.orthographic, point.z, map.texel);
     bool hidden = false, beyond = nearest.x < 0, covered = false;
     for (int index = 0; index < 4; ++index) {
         ivec2 texel = ivec2(index % 2 == 0 ? first.x : last.x, index / 2 == 0 ? first.y : last.y);
@@ -180,8 +169,7 @@ bool is_hidden(ShadowMap map, ivec2 nearest, vec3 point, vec2 gradient, float to
         vec3 caster = fetch_caster(map, texel);
         float change = dot(caster.yz, offset);
         bool hides_it = hides(caster, offset, point.z, gradient, tolerance);
-        bool meets = caster.x + change - point.z < CONTACT * (texel_depth + abs(caster.y) + abs(caster.z))
-                     && is_crease(caster.yz / slope_unit(map.orthographic, caster.x, map.texel), slope);
+        bool meets = caster.x + change - point.z < CONTACT * (texel_depth + abs(caster.y) + abs(caster.z));
         if (texel == nearest) {
             hidden = hides_it;
             beyond = caster.x + max(change, dot(gradient, offset)) < point.z - tolerance;
