@@ -5,11 +5,11 @@ import numpy as np
 
 from ..scene import World
 from ..scene.arrays import Float32Array, Float64Array, Int64Array
-from ..scene.equirectangular import box_sums, coarsened, look_up, texel_coordinates, texel_solid_angles
+from ..scene.equirectangular import box_sums, coarsened, look_up, texel_solid_angles
 
 _LARGEST_TABLE = (256, 512)
 _COARSE = (512, 1024)  # to which larger maps are averaged first
-_UNIFORM_SHARE = 0.25
+UNIFORM_SHARE = 0.25
 """Share of the samples that are drawn from everywhere alike: no direction's weight is more than what drawing all of
 them so would give, divided by this."""
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -35,7 +35,7 @@ class WorldSampler:
         everywhere = np.broadcast_to(self._solid_angles[:, None] / (4.0 * np.pi), power.shape)
         total = float(power.sum())
         self._probabilities = (
-            everywhere if total == 0.0 else everywhere + (power / total - everywhere) * (1.0 - _UNIFORM_SHARE)
+            everywhere if total == 0.0 else everywhere + (power / total - everywhere) * (1.0 - UNIFORM_SHARE)
         )
         self._row_edges = _cumulated(self._probabilities.sum(axis=1)[None])[0]
         self._column_edges = _cumulated(self._probabilities)
@@ -57,14 +57,6 @@ class WorldSampler:
         drawn = np.stack([cosine * np.cos(azimuth), cosine * np.sin(azimuth), sine], axis=-1)
         density = self._probabilities[row, column] / self._solid_angles[row]
         return drawn @ self._world_from_environment.T, self._shown(drawn) / density[:, None]
-
-    def density(self, directions: Float64Array) -> Float64Array:
-        """(n,) probability per steradian with which unit directions (n, 3) in world space are drawn."""
-        height, width = self._probabilities.shape
-        column, row = texel_coordinates(directions @ self._world_from_environment, height, width)
-        rows = np.clip(np.floor(row + 0.5), 0, height - 1).astype(np.int64)
-        columns = np.floor(column + 0.5).astype(np.int64) % width
-        return self._probabilities[rows, columns] / self._solid_angles[rows]
 
     def _shown(self, directions: Float64Array) -> Float64Array:
         """(n, 3) radiance of directions (n, 3) of the map."""

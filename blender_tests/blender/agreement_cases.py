@@ -13,6 +13,7 @@ from agreement_scenes import (
     LAMP_TARGET,
     MATTE,
     PLASTIC,
+    cut_out,
     lamp,
     material,
     node,
@@ -181,16 +182,7 @@ def pierced(squares: int = 2, texels: int = 16) -> bpy.types.Material:
     rows, columns = np.meshgrid(np.arange(squares * texels), np.arange(squares * texels), indexing="ij")
     pixels = np.ones((*rows.shape, 4), np.float32)
     pixels[..., 3] = (rows // texels + columns // texels) % 2
-    image = bpy.data.images.new("Chequerboard", squares * texels, squares * texels, alpha=True)
-    image.pixels.foreach_set(pixels.ravel())
-    image.pack()
-    result = material("Pierced", PLASTIC)
-    texture = result.node_tree.nodes.new("ShaderNodeTexImage")
-    texture.image, texture.interpolation = image, "Closest"
-    inputs = node(result.node_tree, "BSDF_PRINCIPLED").inputs
-    result.node_tree.links.new(texture.outputs["Color"], inputs["Base Color"])
-    result.node_tree.links.new(texture.outputs["Alpha"], inputs["Alpha"])
-    return result
+    return cut_out("Pierced", PLASTIC, pixels)
 
 
 def clay(*size: int, **surfaces: Any) -> bpy.types.Scene:

@@ -4,6 +4,7 @@
 from typing import Any
 
 import bpy
+import numpy as np
 from mathutils import Vector
 
 Point = tuple[float, float, float]
@@ -32,6 +33,21 @@ def material(name: str, values: dict[str, Any]) -> bpy.types.Material:
     inputs = node(result.node_tree, "BSDF_PRINCIPLED").inputs
     for socket, value in values.items():
         inputs[socket].default_value = value
+    return result
+
+
+def cut_out(name: str, values: dict[str, Any], pixels: np.ndarray) -> bpy.types.Material:
+    """A Principled material whose colour and alpha are an image's (N, N, 4), its texels unfiltered."""
+    side = len(pixels)
+    image = bpy.data.images.new(name, side, side, alpha=True)
+    image.pixels.foreach_set(pixels.ravel())
+    image.pack()
+    result = material(name, values)
+    texture = result.node_tree.nodes.new("ShaderNodeTexImage")
+    texture.image, texture.interpolation = image, "Closest"
+    inputs = node(result.node_tree, "BSDF_PRINCIPLED").inputs
+    result.node_tree.links.new(texture.outputs["Color"], inputs["Base Color"])
+    result.node_tree.links.new(texture.outputs["Alpha"], inputs["Alpha"])
     return result
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 import numpy as np
-from agreement_scenes import MATTE, box, camera, empty_scene, finished, lamp, material, node, plane, sphere
+from agreement_scenes import MATTE, box, camera, cut_out, empty_scene, finished, lamp, material, plane, sphere
 
 Point = tuple[float, float, float]
 
@@ -66,16 +66,7 @@ def leaf() -> bpy.types.Material:
     pixels = np.empty((LEAF_TEXELS, LEAF_TEXELS, 4), np.float32)
     pixels[..., :3] = (0.3, 0.6, 0.2)
     pixels[..., 3] = (x * x + y * y < edge * edge) & (np.abs(x - 0.3 * y) > 0.06)
-    image = bpy.data.images.new("Leaf", LEAF_TEXELS, LEAF_TEXELS, alpha=True)
-    image.pixels.foreach_set(pixels.ravel())
-    image.pack()
-    result = material("Leaf", MATTE)
-    texture = result.node_tree.nodes.new("ShaderNodeTexImage")
-    texture.image, texture.interpolation = image, "Closest"
-    inputs = node(result.node_tree, "BSDF_PRINCIPLED").inputs
-    result.node_tree.links.new(texture.outputs["Color"], inputs["Base Color"])
-    result.node_tree.links.new(texture.outputs["Alpha"], inputs["Alpha"])
-    return result
+    return cut_out("Leaf", MATTE, pixels)
 
 
 def lampshade(width: int = WIDTH, height: int = HEIGHT) -> bpy.types.Scene:

@@ -41,7 +41,10 @@ def used(layout, steps):
 
 @given(st.integers(1, 3), STEPS)
 def test_squares_lie_within_pages_and_never_overlap(pages, steps):
-    used(AtlasLayout(PAGE, pages), steps)
+    held = used(AtlasLayout(PAGE, pages), steps)
+    covered = painted(held, pages)
+    assert covered.max(initial=0) <= 1
+    assert covered.sum() == sum(slot.size**2 for slot in held)
 
 
 @given(st.integers(1, 3), STEPS, st.randoms(use_true_random=False))

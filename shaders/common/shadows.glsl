@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whether light arrives: lookups into the shadow maps that shaders/shadow_maps draws. Needs common/lights.glsl and
-// common/hash.glsl. Positions are camera-relative, m.
+// Whether light arrives: lookups into the shadow maps that shaders/shadow_maps draws. Needs common/lights.glsl.
+// Positions are camera-relative, m.
 
 #include "common/caster_plane.glsl"
 

@@ -5,13 +5,12 @@ from collections.abc import Iterator
 from itertools import combinations
 
 from ...scene import Channel, DebugView, SunDisc
-from ..device import Device
 from ..environment import ENVIRONMENT_DEFINE, ENVIRONMENT_UNIFORMS, MAP_SAMPLER, environment_uniforms
 from ..plan import SUM_CHANNELS, PlannedPass
 from ..programs import ProgramSpec
 from ..uniforms import UniformBlock
 from .base import Frame, subsets
-from .fullscreen import FullscreenDraw, fullscreen_program
+from .fullscreen import FullscreenPass, fullscreen_program
 
 SUN_DISC_UNIFORMS = (
     ("sun_direction", "vec4"),  # and half_angle
@@ -32,13 +31,11 @@ COMPOSITE_UNIFORMS = UniformBlock(
 )
 
 
-class CompositePass:
+class CompositePass(FullscreenPass):
     """Writes the film."""
 
     name = "composite"
-
-    def __init__(self, device: Device) -> None:
-        self._fullscreen = FullscreenDraw(device, COMPOSITE_UNIFORMS)
+    block = COMPOSITE_UNIFORMS
 
     @classmethod
     def variants(cls) -> Iterator[ProgramSpec]:
@@ -55,9 +52,6 @@ class CompositePass:
                 yield _program(read | film | {"DIRECT"})
         for background in subsets(("ENVIRONMENT", "FILM_ENVIRONMENT")):
             yield _program(background | {"DIRECT", "SUN_DISC"})
-
-    def prepare(self, frame: Frame, planned: PlannedPass) -> None:
-        """Nothing but uniforms, which `run` writes."""
 
     def run(self, frame: Frame, planned: PlannedPass) -> None:
         """Add one sample to the film."""
@@ -80,10 +74,6 @@ class CompositePass:
             opaque=int(not debug and not frame.settings.transparent_film),
             shown_layer=min(frame.settings.debug_layer, frame.plan.layers - 1) if debug else 0,
         )
-
-    def release(self) -> None:
-        """Free the pass's buffers."""
-        self._fullscreen.release()
 
 
 def _sun_disc_uniforms(disc: SunDisc | None) -> dict[str, object]:

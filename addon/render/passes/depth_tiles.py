@@ -5,33 +5,26 @@ from collections.abc import Iterator
 
 import moderngl
 
-from ..device import Device
 from ..layout import DEPTH_TILES_TARGET, TILE_SIZE
 from ..plan import PlannedPass
 from ..programs import ProgramSpec
 from ..uniforms import UniformBlock
 from .base import Frame
-from .fullscreen import FullscreenDraw, fullscreen_program
+from .fullscreen import FullscreenPass, fullscreen_program
 
 DEPTH_TILES_UNIFORMS = UniformBlock("DepthTilesUniforms", (("layer", "int"),))
 
 
-class DepthTilesPass:
+class DepthTilesPass(FullscreenPass):
     """Reduces the view depth of each layer of the deep G-buffer to its tiles' ranges."""
 
     name = "depth_tiles"
-
-    def __init__(self, device: Device) -> None:
-        self._device = device
-        self._fullscreen = FullscreenDraw(device, DEPTH_TILES_UNIFORMS)
+    block = DEPTH_TILES_UNIFORMS
 
     @classmethod
     def variants(cls) -> Iterator[ProgramSpec]:
         """The only one."""
         yield _program()
-
-    def prepare(self, frame: Frame, planned: PlannedPass) -> None:
-        """Nothing but uniforms, which `run` writes."""
 
     def run(self, frame: Frame, planned: PlannedPass) -> None:
         """Reduce all layers."""
@@ -41,10 +34,6 @@ class DepthTilesPass:
         for layer in range(frame.plan.layers):
             frame.pool.framebuffer(((DEPTH_TILES_TARGET, layer),)).use()
             self._fullscreen.draw(spec, layer=layer)
-
-    def release(self) -> None:
-        """Free the pass's buffers."""
-        self._fullscreen.release()
 
 
 def _program() -> ProgramSpec:

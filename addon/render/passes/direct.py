@@ -7,7 +7,6 @@ from math import sqrt
 
 import moderngl
 
-from ..device import Device
 from ..direct_needs import DIRECT_DEFINES, direct_program_defines
 from ..environment import ENVIRONMENT_DEFINE, ENVIRONMENT_SAMPLERS, ENVIRONMENT_UNIFORMS, environment_uniforms
 from ..layout import LIGHTS_PER_PAGE, TILE_SIZE, light_pages
@@ -18,7 +17,7 @@ from ..sampling import pixel_shift
 from ..shadow_table import TEXELS_PER_MAP
 from ..uniforms import UniformBlock
 from .base import Frame
-from .fullscreen import FullscreenDraw, fullscreen_program
+from .fullscreen import FullscreenPass, fullscreen_program
 
 DIRECT_UNIFORMS = UniformBlock(
     "DirectUniforms",
@@ -48,22 +47,16 @@ _DIRECTIONS_PER_LOBE = 8.0
 """The world's samples must fall that densely into a reflection's lobe, or a wider one is taken for what they show."""
 
 
-class DirectPass:
+class DirectPass(FullscreenPass):
     """Shades each layer of the deep G-buffer once."""
 
     name = "direct"
-
-    def __init__(self, device: Device) -> None:
-        self._device = device
-        self._fullscreen = FullscreenDraw(device, DIRECT_UNIFORMS)
+    block = DIRECT_UNIFORMS
 
     @classmethod
     def variants(cls) -> Iterator[ProgramSpec]:
         """What stands for every program that a plan can ask for."""
         yield from (_program(defines) for defines in program_defines(DIRECT_DEFINES))
-
-    def prepare(self, frame: Frame, planned: PlannedPass) -> None:
-        """Nothing but uniforms, which `run` writes."""
 
     def run(self, frame: Frame, planned: PlannedPass) -> None:
         """Shade all layers; the picture's own tells diffuse from glossy where somebody asks."""
@@ -77,10 +70,6 @@ class DirectPass:
             targets = planned.writes if split else planned.writes[:1]
             frame.pool.framebuffer(tuple((target.name, layer) for target in targets)).use()
             self._fullscreen.draw(spec, **light_uniforms(frame), layer=layer)
-
-    def release(self) -> None:
-        """Free the pass's buffers."""
-        self._fullscreen.release()
 
     def _bind(self, frame: Frame, spec: ProgramSpec) -> None:
         bind_lights(frame, spec)

@@ -106,3 +106,20 @@ class FullscreenDraw:
         for vertex_array in self._vertex_arrays.values():
             vertex_array.release()
         self._vertex_arrays.clear()
+
+
+class FullscreenPass:
+    """What passes that shade every texel have in common; `block`: a pass's own uniforms."""
+
+    block: UniformBlock
+
+    def __init__(self, device: Device) -> None:
+        self._device = device
+        self._fullscreen = FullscreenDraw(device, self.block)
+
+    def prepare(self, frame: Frame, planned: PlannedPass) -> None:
+        """Nothing but uniforms, which `run` writes."""
+
+    def release(self) -> None:
+        """Free the pass's buffers."""
+        self._fullscreen.release()

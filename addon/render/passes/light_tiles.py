@@ -5,34 +5,27 @@ from collections.abc import Iterator
 
 import moderngl
 
-from ..device import Device
 from ..layout import LIGHT_TILES_TARGET, LIGHTS_PER_PAGE, TILE_SIZE
 from ..light_table import LIGHTS_PER_ROW, TEXELS_PER_LIGHT, TEXELS_PER_SAMPLE
 from ..plan import PlannedPass
 from ..programs import ProgramSpec
 from ..uniforms import UniformBlock
 from .base import Frame
-from .fullscreen import FullscreenDraw, fullscreen_program
+from .fullscreen import FullscreenPass, fullscreen_program
 
 LIGHT_TILES_UNIFORMS = UniformBlock("LightTilesUniforms", (("layer", "int"), ("page", "int"), ("light_count", "int")))
 
 
-class LightTilesPass:
+class LightTilesPass(FullscreenPass):
     """Tests every light of the sample against every tile."""
 
     name = "light_tiles"
-
-    def __init__(self, device: Device) -> None:
-        self._device = device
-        self._fullscreen = FullscreenDraw(device, LIGHT_TILES_UNIFORMS)
+    block = LIGHT_TILES_UNIFORMS
 
     @classmethod
     def variants(cls) -> Iterator[ProgramSpec]:
         """The only one."""
         yield _program()
-
-    def prepare(self, frame: Frame, planned: PlannedPass) -> None:
-        """Nothing but uniforms, which `run` writes."""
 
     def run(self, frame: Frame, planned: PlannedPass) -> None:
         """Write the masks of all layers, in pages of 128 lights."""
@@ -46,10 +39,6 @@ class LightTilesPass:
             for page in range(pages):
                 frame.pool.framebuffer(((LIGHT_TILES_TARGET, layer * pages + page),)).use()
                 self._fullscreen.draw(spec, layer=layer, page=page, light_count=frame.lighting.count)
-
-    def release(self) -> None:
-        """Free the pass's buffers."""
-        self._fullscreen.release()
 
 
 def _program() -> ProgramSpec:
