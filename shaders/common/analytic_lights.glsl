@@ -110,15 +110,6 @@ Polygon light_polygon(Light light, vec3 center)
                          : rectangle_polygon(center, light.half_x, light.half_y);
 }
 
-/** Share of a cosine lobe about the normal that a polygon covers. */
-float covered_cosine(Polygon polygon, vec3 normal)
-{
-    vec3 tangent, bitangent;
-    orthonormal_basis(normal, tangent, bitangent);
-    mat3 local = transpose(mat3(tangent, bitangent, normal));
-    return cosine_lobe_over(transformed(local, polygon), vec3(0.0, 0.0, 1.0)).z;
-}
-
 /**
  * What of a light its spread lets shine here: the rectangle around it, and the mean of the spread factor over that.
  *
