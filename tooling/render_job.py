@@ -21,7 +21,7 @@ sys.path.append(str(Path(__file__).resolve().parent.parent))
 import bpy
 
 from tooling.console import INTERRUPTED, MARK
-from tooling.engine_settings import ENGINES, Engine, assign
+from addon.report.engines import ENGINES, Engine, assign
 
 EXTENSION_REPOSITORY = "user_default"
 BESIDE_THE_BLEND = "//"  # where our layer files go unless the file says otherwise

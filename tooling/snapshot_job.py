@@ -22,7 +22,7 @@ from addon.render import Device, DeviceError, Renderer, RenderError, ShaderError
 from addon.scene import Channel, Moment, RenderSettings, Scene, Sequence, snapshot
 from addon.scene.snapshot import Snapshot
 from tooling.console import INTERRUPTED, MARK
-from tooling.engine_settings import FALSE, TRUE
+from addon.report.engines import FALSE, TRUE
 
 T = TypeVar("T")
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The engines `build.py render` drives, and text from the command line as values of their properties.
+"""The engines that are driven, and text as values of their properties.
 
-Runs inside Blender (`render_job`) but imports nothing of it; what it reads is duck-typed.
+Used inside Blender but imports nothing of it; what it reads is duck-typed.
 """
 
 from __future__ import annotations

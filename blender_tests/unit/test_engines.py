@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tooling.engine_settings import assign, parse
+from addon.report.engines import assign, parse
 
 
 def prop(kind, **more):

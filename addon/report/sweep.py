@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a report measures: one table of series. A new method joins with one line."""
+
+import ast
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+PRESETS = Path(__file__).resolve().parent.parent / "ui" / "presets" / "deep_gbuffer"
+PERCENT = "resolution_percentage"
+"""A setting of the scene, not of an engine: the picture is rendered at this percentage of its width and height."""
+
+Settings = Mapping[str, str]
+"""Properties of the engine's own settings, as `build.py render --set` takes them."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """One way to render a scene."""
+
+    series: str
+    label: str
+    engine: str
+    settings: Settings
+
+    @property
+    def is_peer(self) -> bool:
+        """Whether another engine than ours renders it."""
+        return self.engine != OURS
+
+    @property
+    def identity(self) -> tuple[str, tuple[tuple[str, str], ...]]:
+        """Equal for points that render the same whatever they are called."""
+        return self.engine, tuple(sorted(self.settings.items()))
+
+
+@dataclass(frozen=True)
+class Series:
+    """Points that differ in one thing.
+
+    `values` maps each point's label to its settings, which come on top of `base`; `quick` names those of the short report.
+    """
+
+    name: str
+    engine: str
+    values: Mapping[str, Settings]
+    base: Settings = field(default_factory=dict[str, str])
+    quick: tuple[str, ...] = ()
+
+    def points(self, *, quick: bool) -> list[Point]:
+        """All points, or those of the short report."""
+        return [
+            Point(self.name, label, self.engine, {**self.base, **settings})
+            for label, settings in self.values.items()
+            if not quick or label in self.quick
+        ]
+
+
+def each(name: str, values: Iterable[object], label: str = "{}") -> dict[str, Settings]:
+    """One point per value of the property `name`, labelled by `label` filled with the value."""
+    return {label.format(value): {name: str(value)} for value in values}
+
+
+def presets(folder: str) -> dict[str, Settings]:
+    """One point per preset file in our presets' `folder`, with every engine setting that it makes."""
+    return {path.stem: _assignments(path) for path in sorted((PRESETS / folder).glob("*.py"))}
+
+
+def _assignments(path: Path) -> Settings:
+    """Name and value of every `settings.NAME = VALUE` line in a preset file that concerns final renders."""
+    found: dict[str, str] = {}
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if not isinstance(node, ast.Assign) or not isinstance(target := node.targets[0], ast.Attribute):
+            continue
+        if not target.attr.startswith("viewport_"):
+            found[target.attr] = str(ast.literal_eval(node.value))
+    return found
+
+
+OURS = "DEEP_GBUFFER"
+STRUCTURE = {"samples": "4"}
+"""What the axes other than the number of samples are measured with."""
+
+CYCLES = {"use_adaptive_sampling": "False", "sample_clamp_direct": "0", "sample_clamp_indirect": "0"}
+NOISY = {**CYCLES, "use_denoising": "False"}
+DENOISED = {
+    **CYCLES,
+    "use_denoising": "True",
+    "denoiser": "OPENIMAGEDENOISE",
+    "denoising_prefilter": "FAST",
+    "denoising_quality": "FAST",
+}
+EEVEE = {"use_raytracing": "True"}
+
+SWEEP = (
+    Series("Samples", OURS, each("samples", (1, 4, 16, 64), "{} spp"), quick=("1 spp", "4 spp", "16 spp", "64 spp")),
+    Series("Quality preset", OURS, presets("sampling"), quick=("Draft",)),
+    Series("Resolution scale", OURS, each(PERCENT, (50, 71), "{} %"), STRUCTURE, quick=("50 %",)),
+    Series("Layers", OURS, each("layers", (1, 2, 4, 8)), STRUCTURE, quick=("1", "4")),
+    Series("Minimum separation", OURS, each("minimum_separation", (0, 0.05, 1), "{} m"), STRUCTURE),
+    Series("Layer preset", OURS, presets("layers"), STRUCTURE),
+    Series(
+        "Variant",
+        OURS,
+        each("variant", ("PREPASS", "DELAY", "PREVIOUS", "PREDICT", "REPROJECT")),
+        STRUCTURE,
+        quick=("PREPASS",),
+    ),
+    Series("Cycles", "CYCLES", each("samples", (1, 4, 16), "{} spp"), NOISY, quick=("1 spp", "4 spp", "16 spp")),
+    Series("Cycles, denoised", "CYCLES", each("samples", (1, 4, 16), "{} spp"), DENOISED, quick=("1 spp", "4 spp")),
+    Series("EEVEE", "EEVEE", each("taa_render_samples", (1, 16), "{} spp"), EEVEE, quick=("1 spp",)),
+    Series("Workbench", "WORKBENCH", {"": {}}, quick=("",)),
+)
+
+
+def points(*, quick: bool) -> list[Point]:
+    """Every point of the table; those that render the same under two names only under the first."""
+    found: dict[object, Point] = {}
+    for series in SWEEP:
+        for point in series.points(quick=quick):
+            found.setdefault(point.identity, point)
+    return list(found.values())
