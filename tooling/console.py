@@ -15,8 +15,6 @@ from pathlib import Path
 TAIL_LINES = 25
 HEARTBEAT_SECONDS = 10.0
 GRACE_SECONDS = 5.0
-INTERRUPTED = 130
-MARK = "\x1edeep-gbuffer "  # starts the lines that a render job means for its parent
 
 
 class ToolError(RuntimeError):

@@ -7,15 +7,13 @@ import json
 import os
 import re
 import shutil
-import subprocess
 import tempfile
 from argparse import Namespace
-from collections import deque
 from pathlib import Path
 from typing import Any
 
-from tooling import environments, packaging, places
-from tooling.console import INTERRUPTED, MARK, TAIL_LINES, Progress, ToolError, say, stop, warn
+from tooling import environments, jobs, packaging, places
+from tooling.console import Progress, ToolError, say, warn
 
 JOB = places.REPOSITORY / "tooling" / "render_job.py"
 SNAPSHOT_JOB = places.REPOSITORY / "tooling" / "snapshot_job.py"
@@ -136,54 +134,20 @@ class Run:
         self.statistics: list[dict[str, Any]] = []
         self._output = output
         self._numbers = numbers
-        self._error: str | None = None
         self._pictures = 0
         self._progress = Progress("Rendering")
 
     def execute(self, command: list[str], scratch: Path) -> None:
-        """Run Blender to its end. Raises ToolError with what Blender said when it fails.
-
-        A KeyboardInterrupt ends Blender first; its temporary files and profile are inside `scratch`.
-        """
-        profile = scratch / "profile"
-        profile.mkdir()
-        child = subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            errors="replace",
-            env={**os.environ, "BLENDER_USER_RESOURCES": str(profile), "TMPDIR": str(scratch), "TEMP": str(scratch)},
-            start_new_session=True,
-        )
-        tail: deque[str] = deque(maxlen=TAIL_LINES)
+        """Run Blender to its end, inside the folder `scratch`. Raises ToolError and KeyboardInterrupt as `jobs.run`."""
         try:
-            for line in child.stdout or ():
-                before, found, message = line.partition(MARK)
-                if found:
-                    self._take(json.loads(message))
-                elif before.strip():
-                    tail.append(before)
-            child.wait()
+            jobs.run(command, scratch, self._take, lambda: self._pictures > 0)
         finally:
             self._progress.clear()
-            stop(child)
-        if child.returncode == INTERRUPTED:
-            raise KeyboardInterrupt
-        if self._error is not None:
-            raise ToolError(self._error)
-        if child.returncode != 0 or not self._pictures:
-            ending = f"signal {-child.returncode}" if child.returncode < 0 else f"exit code {child.returncode}"
-            raise ToolError(f"Blender ended without a picture ({ending}); it last said:\n{''.join(tail)}".rstrip())
 
-    def _take(self, message: dict[str, Any]) -> None:
+    def _take(self, kind: str, content: Any) -> None:
         """Act on one message of the job."""
-        kind, content = message["kind"], message["content"]
         if kind == "progress":
             self._progress.show(content)
-        elif kind == "error":
-            self._error = content
         elif kind == "statistics":
             self.statistics = content
             for warning in dict.fromkeys(text for entry in content for text in entry["warnings"]):

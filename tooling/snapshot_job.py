@@ -19,24 +19,15 @@ sys.path.append(str(Path(__file__).resolve().parent.parent))
 
 from addon.output import write_channels
 from addon.render import Device, DeviceError, Renderer, RenderError, ShaderError, gl_thread, stop_gl_thread
+from addon.report.engines import FALSE, TRUE
+from addon.report.messages import INTERRUPTED, JobError, send
 from addon.scene import Channel, Moment, RenderSettings, Scene, Sequence, snapshot
 from addon.scene.snapshot import Snapshot
-from tooling.console import INTERRUPTED, MARK
-from addon.report.engines import FALSE, TRUE
 
 T = TypeVar("T")
 
 DEFAULT_RESOLUTION = (1920, 1080)
 FIXED = {"width", "height", "channels", "deep_output"}
-
-
-class JobError(RuntimeError):
-    """A reason why there is no picture; its text is the whole message."""
-
-
-def send(kind: str, content: object) -> None:
-    """Tell the parent something."""
-    print(MARK + json.dumps({"kind": kind, "content": content}), flush=True)
 
 
 def settings_of(job: dict[str, Any]) -> RenderSettings:

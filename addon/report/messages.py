@@ -17,6 +17,14 @@ INTERRUPTED = 130
 """Exit code of a process that was interrupted."""
 
 
+class JobError(RuntimeError):
+    """A reason why a job has no picture; its text is the whole message."""
+
+
+class EngineMissingError(JobError):
+    """The reason is that this Blender has no such engine."""
+
+
 def send(kind: str, content: object) -> None:
     """Tell the parent something."""
     sys.stdout.write(f"{MARK}{json.dumps({'kind': kind, 'content': content})}\n")

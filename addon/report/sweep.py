@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from .reference import REFERENCE_SETTINGS, UNBIASED
+
 PRESETS = Path(__file__).resolve().parent.parent / "ui" / "presets" / "deep_gbuffer"
 PERCENT = "resolution_percentage"
 """A setting of the scene, not of an engine: the picture is rendered at this percentage of its width and height."""
@@ -38,7 +40,8 @@ class Point:
 class Series:
     """Points that differ in one thing.
 
-    `values` maps each point's label to its settings, which come on top of `base`; `quick` names those of the short report.
+    `values` maps each point's label to its settings, which come on top of `base`; `quick` names those of the short
+    report.
     """
 
     name: str
@@ -81,10 +84,8 @@ OURS = "DEEP_GBUFFER"
 STRUCTURE = {"samples": "4"}
 """What the axes other than the number of samples are measured with."""
 
-CYCLES = {"use_adaptive_sampling": "False", "sample_clamp_direct": "0", "sample_clamp_indirect": "0"}
-NOISY = {**CYCLES, "use_denoising": "False"}
 DENOISED = {
-    **CYCLES,
+    **UNBIASED,
     "use_denoising": "True",
     "denoiser": "OPENIMAGEDENOISE",
     "denoising_prefilter": "FAST",
@@ -106,7 +107,13 @@ SWEEP = (
         STRUCTURE,
         quick=("PREPASS",),
     ),
-    Series("Cycles", "CYCLES", each("samples", (1, 4, 16), "{} spp"), NOISY, quick=("1 spp", "4 spp", "16 spp")),
+    Series(
+        "Cycles",
+        "CYCLES",
+        each("samples", (1, 4, 16), "{} spp"),
+        REFERENCE_SETTINGS,
+        quick=("1 spp", "4 spp", "16 spp"),
+    ),
     Series("Cycles, denoised", "CYCLES", each("samples", (1, 4, 16), "{} spp"), DENOISED, quick=("1 spp", "4 spp")),
     Series("EEVEE", "EEVEE", each("taa_render_samples", (1, 16), "{} spp"), EEVEE, quick=("1 spp",)),
     Series("Workbench", "WORKBENCH", {"": {}}, quick=("",)),

@@ -3,7 +3,6 @@
 
 import json
 import os
-import platform
 import subprocess
 import sys
 import tempfile
@@ -75,17 +74,6 @@ def in_blender(script: Path, *arguments: str) -> None:
         }
         command = [str(environments.blender_python()), "-P", str(script), *arguments]
         subprocess.run(command, env=surroundings, check=True)
-
-
-def machine() -> str:
-    """The processor's model, the cores this process may use, and the operating system."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    model = platform.processor()
-    described = Path("/proc/cpuinfo")
-    if described.is_file():
-        lines = (line.partition(":") for line in described.read_text(encoding="utf-8").splitlines())
-        model = next((value.strip() for key, _, value in lines if key.strip() == "model name"), model)
-    return f"{model or platform.machine()}, {cores} cores, {platform.system()}"
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

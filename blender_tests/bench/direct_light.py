@@ -7,7 +7,8 @@ import tempfile
 from math import inf
 from pathlib import Path
 
-from blender_tests.bench._runs import in_blender, machine, report, table
+from blender_tests.bench._runs import in_blender, report, table
+from tooling.machine import machine
 
 WIDTH, HEIGHT = 320, 180
 NAME = "direct_light"

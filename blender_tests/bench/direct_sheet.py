@@ -5,8 +5,11 @@ import sys
 import tempfile
 from pathlib import Path
 
-from blender_tests.bench._flip import combined, flip, shown, write_sheet
-from blender_tests.bench._runs import REPOSITORY, SHARED, machine, picture, report, table
+from addon.report.metrics import display
+from addon.report.pictures import combined
+from blender_tests.bench._runs import REPOSITORY, SHARED, picture, report, table
+from tooling.machine import machine
+from tooling.report.pictures import flip, write_sheet
 
 SCENES = {
     "Sponza, sun and sky": SHARED / "sponza" / "sponza.blend",
@@ -47,9 +50,9 @@ def main(arguments: list[str]) -> int:
                 for seed in (0, 1)
             ]
             ours = picture(blend, "DEEP_GBUFFER", Path(folder) / "ours.exr", RESOLUTION, OUR_SAMPLES, {})
-            pictures = [shown(linear) for linear in (combined(ours), 0.5 * (halves[0] + halves[1]))]
+            pictures = [display(linear) for linear in (combined(ours), 0.5 * (halves[0] + halves[1]))]
             errors, mean = flip(pictures[1], pictures[0])
-            noise = flip(*(shown(half) for half in halves))[1]
+            noise = flip(*(display(half) for half in halves))[1]
             worst = max(worst, mean)
             rows.append([name, f"{mean:.4f}", f"{noise:.4f}"])
             captions = (f"{name}: Deep G-Buffer", "Cycles, no bounces", f"FLIP {mean:.3f}")

@@ -6,7 +6,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from blender_tests.bench._runs import REPOSITORY, RESOLUTION, SAMPLES, machine, render, report, table
+from blender_tests.bench._runs import REPOSITORY, RESOLUTION, SAMPLES, render, report, table
+from tooling.machine import machine
 
 SCENE = REPOSITORY / "scenes" / "cornell_box.blend"
 ENGINES = ("DEEP_GBUFFER", "EEVEE")

@@ -24,7 +24,8 @@ from blender_tests.bench._generation_tables import (
 )
 from blender_tests.bench._measuring import Bench, Way
 from blender_tests.bench._plot import plot
-from blender_tests.bench._runs import RESULTS, machine, report
+from blender_tests.bench._runs import RESULTS, report
+from tooling.machine import machine
 
 WIDTH, HEIGHT = 640, 360
 NAME, TITLE = "generation", "Generating the deep G-buffer"

@@ -12,7 +12,8 @@ import numpy as np
 
 from addon.render import Device, Renderer, gl_thread, stop_gl_thread
 from addon.scene import Light, LightKind, RenderSettings, Scene, World, snapshot
-from blender_tests.bench._runs import SHARED, machine, report, snapshots, table
+from blender_tests.bench._runs import SHARED, report, snapshots, table
+from tooling.machine import machine
 
 SPONZA = SHARED / "sponza" / "sponza.blend"
 NAME = "many_lights"

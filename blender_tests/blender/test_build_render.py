@@ -10,18 +10,18 @@ from pathlib import Path
 import bpy
 import pytest
 
-from tooling import render_job
-from tooling.console import INTERRUPTED
+from addon.report.messages import INTERRUPTED
+from addon.report.rendering import choose_format
 
 MANY = 65536  # minutes of work
 
 
 def test_exr_files_are_compressed_without_loss_whatever_the_file_says(empty_scene):
     image = empty_scene.render.image_settings
-    render_job.choose_format(empty_scene, ".exr")
+    choose_format(empty_scene, ".exr")
     image.exr_codec = "DWAA"
     image.color_depth = "16"
-    render_job.choose_format(empty_scene, ".exr")
+    choose_format(empty_scene, ".exr")
     assert (image.file_format, image.exr_codec, image.color_depth) == ("OPEN_EXR_MULTILAYER", "ZIP", "32")
 
 

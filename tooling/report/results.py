@@ -29,7 +29,7 @@ class Subject:
 
 @dataclass(frozen=True)
 class Reference:
-    """What pictures are judged by. `noise_rmse` (scene-linear) and `noise_flip` estimate how far it is itself from the truth.
+    """What pictures are judged by. `noise_rmse` (scene-linear) and `noise_flip` estimate how far it is from the truth.
 
     `source` says where it is from, in words. `pictures`: scene-linear EXR files, one per frame.
     """
@@ -54,9 +54,10 @@ class Run:
 
 @dataclass(frozen=True)
 class Judgement:
-    """How far a point's pictures are from the reference; means over the frames of a sequence.
+    """How far a point's pictures are from the reference; of a sequence, `errors` over all its frames.
 
-    `flip`: mean FLIP in display space. `flicker`: None for a single frame. `digest`: equal for equal pictures.
+    `flip`: in display space, mean over pixels and frames. `flicker`: None for a single frame, and where nothing in a
+    sequence can be followed from frame to frame. `digest`: equal for equal pictures.
     `picture` (as displayed) and `heat` (FLIP's error map) are PNG files of the first frame's judged rectangle.
     """
 
