@@ -3,6 +3,7 @@
 
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))
 
@@ -10,20 +11,36 @@ from addon.render.layout import channels_table
 from tooling import places
 
 COMMAND = "python tooling/readme_tables.py"
-BEGIN = "<!-- channels: made by tooling/readme_tables.py from addon/render/layout.py -->\n"
-END = "<!-- end of channels -->\n"
+
+
+class Block(NamedTuple):
+    """A part of the README that is not written by hand: the lines, comments, around it."""
+
+    begin: str
+    end: str
+
+
+CHANNELS = Block(
+    "<!-- channels: made by tooling/readme_tables.py from addon/render/layout.py -->\n", "<!-- end of channels -->\n"
+)
+REPORT = Block("<!-- report: made by build.py bench report -->\n", "<!-- end of report -->\n")
+
+
+def filled(readme: str, block: Block, content: str) -> str:
+    """The README's text with `content`, which ends with a line break, in `block`.
+
+    Raises ValueError where the comments around it are missing.
+    """
+    before, begin, rest = readme.partition(block.begin)
+    _, end, after = rest.partition(block.end)
+    if not begin or not end:
+        raise ValueError(f"README.md needs the lines {block.begin!r} and {block.end!r} around what is made")
+    return f"{before}{begin}\n{content}\n{end}{after}"
 
 
 def with_tables(readme: str) -> str:
-    """The README's text with its tables as the code has them.
-
-    Raises ValueError where the comments around them are missing.
-    """
-    before, begin, rest = readme.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end:
-        raise ValueError(f"README.md needs the lines {BEGIN!r} and {END!r} around its table of channels")
-    return f"{before}{BEGIN}\n{channels_table()}\n{END}{after}"
+    """The README's text with its tables as the code has them. Raises ValueError as `filled`."""
+    return filled(readme, CHANNELS, channels_table())
 
 
 def main() -> None:

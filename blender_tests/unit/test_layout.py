@@ -35,4 +35,4 @@ def test_the_readme_has_the_tables_that_the_code_makes():
 
 def test_a_readme_without_the_comments_around_the_table_is_refused():
     with pytest.raises(ValueError, match="end of channels"):
-        readme_tables.with_tables(readme_tables.BEGIN)
+        readme_tables.with_tables(readme_tables.CHANNELS.begin)
