@@ -31,6 +31,12 @@ def frame_range(text: str) -> list[int]:
     return list(range(int(match[1]), int(match[2]) + 1))
 
 
+def scene_file(text: str) -> tuple[str, tuple[int, int] | None]:
+    """`room.blend@360x360` as ("room.blend", (360, 360)); without `@…` as (text, None)."""
+    match = re.fullmatch(r"(.+\.blend)@([^/\\]*)", text)
+    return (match[1], resolution(match[2])) if match else (text, None)
+
+
 def assignment(text: str) -> tuple[str, str]:
     """`layers=4` as (name, text)."""
     name, equals, value = text.partition("=")
@@ -55,6 +61,50 @@ def seconds(text: str) -> float:
     if not 0 <= value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds")
     return value
+
+
+def add_report(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb `report` with its options to `verbs`."""
+    report = verbs.add_parser(
+        "report",
+        help="measure error against run time, with Cycles as the reference",
+        description="""Render scenes with everything this engine offers and with Cycles, EEVEE and Workbench, and write
+            a page that shows how far each picture is from a Cycles reference and how long it took. A report that was
+            interrupted goes on where it stopped when the same command is given again.""",
+    )
+    report.set_defaults(verb=("tooling.reporting", "report"))
+    report.add_argument(
+        "scenes",
+        nargs="+",
+        type=scene_file,
+        metavar="SCENE.blend[@WxH]",
+        help="a file to render; with @WxH only the rectangle of that size in the picture's centre is judged",
+    )
+    report.add_argument(
+        "-o",
+        "--output",
+        default="report",
+        metavar="FOLDER",
+        help="gets index.html, report.csv, report.json, report.md and what is measured; default: %(default)s",
+    )
+    report.add_argument("--quick", action="store_true", help="few points, small pictures, one round: some minutes")
+    report.add_argument(
+        "--resolution", type=resolution, metavar="WxH", help="in pixels; default: the file's, with --quick 320x180"
+    )
+    frames = report.add_mutually_exclusive_group()
+    frames.add_argument("--frame", type=int, metavar="N", help="one frame; default: the file's current frame")
+    frames.add_argument("--frames", type=frame_range, metavar="A-B", help="a sequence, whose flicker is measured too")
+    report.add_argument(
+        "--rounds", type=positive, metavar="N", help="processes that render each point; default: 3, with --quick 1"
+    )
+    report.add_argument(
+        "--reference-samples",
+        type=positive,
+        metavar="N",
+        help="per pixel of the Cycles reference, unless a reference.exr of the right size is beside the file; "
+        "default: 1024, with --quick 256",
+    )
+    report.add_argument("--blender", choices=("4.5", "5.2"), help="default: the newest that can be set up here")
 
 
 def command_line() -> argparse.ArgumentParser:
@@ -94,6 +144,8 @@ def command_line() -> argparse.ArgumentParser:
         "--blender", metavar="4.5|5.2|PATH", help="version, or a Blender program that gets the built extension"
     )
 
+    add_report(verbs)
+
     test = verbs.add_parser("test", help="run the tests", description="Run the tests in every Blender version found.")
     test.set_defaults(verb=("tooling.testing", "test"), kinds=TEST_KINDS)
     test.add_argument("--blender", choices=("4.5", "5.2"), help=f"only in {versions}; default: both")
@@ -121,7 +173,8 @@ def main() -> int:
 
     signal.signal(signal.SIGTERM, terminate)
     options = command_line().parse_args()
-    from tooling.console import INTERRUPTED, ToolError, warn
+    from addon.report.messages import INTERRUPTED
+    from tooling.console import ToolError, warn
 
     try:
         module, name = options.verb

@@ -133,6 +133,7 @@ def prepare(scene: bpy.types.Scene, render: dict[str, Any], stem: Path) -> None:
         assign(settings, engine.layers_path, f"{stem}_")
     for name, text in render["settings"].items():
         assign(scene.render if name == PERCENT else settings, name, text)
+    scene.render.use_compositing = scene.render.use_sequencer = False  # the engine's own picture, and no file outputs
     if render["warm_seconds"]:
         scene.render.use_persistent_data = True
     rendering.choose_format(scene, ".exr")

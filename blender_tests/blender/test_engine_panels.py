@@ -23,13 +23,14 @@ ALTERNATIVES = {"minimum_separation": "relative_separation", "guard_band_pixels"
 
 
 class Layout:
-    """Stands in for a UILayout: checks properties, and collects texts, properties and those that are grayed out."""
+    """Stands in for a UILayout: checks and collects texts, operators, properties and those that are grayed out."""
 
     def __init__(self, parent=None):
         self.active = True
         self.parent = parent
         self.texts = parent.texts if parent else []
         self.properties = parent.properties if parent else []
+        self.operators = parent.operators if parent else []
         self.gray = parent.gray if parent else set()
 
     def _nested(self, **_options):
@@ -50,9 +51,15 @@ class Layout:
         if self.grayed_out:
             self.gray.add(name)
 
+    def progress(self, text, factor):
+        assert 0.0 <= factor <= 1.0
+        self.texts.append(text)
+
     def operator(self, name, **_options):
         category, function = name.split(".")
         assert hasattr(getattr(bpy.ops, category), function)
+        self.operators.append(name)
+        return SimpleNamespace()
 
 
 def drawn(panel, context=None):

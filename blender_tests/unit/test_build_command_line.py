@@ -44,13 +44,33 @@ def test_assignments_keep_equals_signs_in_the_value():
         build.assignment("layers")
 
 
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("room.blend", ("room.blend", None)),
+        ("a b/room.blend@360x240", ("a b/room.blend", (360, 240))),
+        ("me@home/room.blend", ("me@home/room.blend", None)),
+        ("old.blend@home/room.blend", ("old.blend@home/room.blend", None)),
+        ("old.blend@home/room.blend@8x9", ("old.blend@home/room.blend", (8, 9))),
+    ],
+)
+def test_a_scene_may_say_which_rectangle_is_judged(text, expected):
+    assert build.scene_file(text) == expected
+
+
+@pytest.mark.parametrize("text", ["room.blend@", "room.blend@360", "room.blend@0x8", "room.blend@8x8@8x8"])
+def test_other_rectangles_are_refused(text):
+    with pytest.raises(argparse.ArgumentTypeError, match="resolution"):
+        build.scene_file(text)
+
+
 @pytest.mark.parametrize("text", ["nan", "inf", "-1", "soon"])
 def test_time_limits_are_finite_and_not_negative(text):
     with pytest.raises(argparse.ArgumentTypeError, match="seconds"):
         build.seconds(text)
 
 
-@pytest.mark.parametrize("verb", ["render", "test", "check", "package", "bench"])
+@pytest.mark.parametrize("verb", ["render", "report", "test", "check", "package", "bench"])
 def test_every_verb_explains_itself(repository, verb):
     answer = subprocess.run(
         [sys.executable, str(repository / "build.py"), verb, "--help"], capture_output=True, text=True, check=True
@@ -72,6 +92,7 @@ def test_a_missing_file_is_an_error_with_a_message(repository, tmp_path):
 
 def test_what_build_py_imports_parses_on_python_3_9(repository):
     files = [repository / "build.py", *(repository / "tooling").glob("*.py")]
+    files += [repository / "addon" / name for name in ("__init__.py", "report/__init__.py", "report/messages.py")]
     for path in files:
         if path.name not in INSIDE_BLENDER_OR_ENVIRONMENT:
             assert ast.parse(path.read_text(encoding="utf-8"), str(path), feature_version=(3, 9)).body

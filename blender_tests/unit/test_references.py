@@ -203,6 +203,15 @@ def test_a_reference_beside_the_file_is_taken_and_checked_by_two_pictures(cycles
     assert len(cycles.rendered) == 2
 
 
+def test_a_reference_beside_the_file_is_taken_without_cycles_too(cycles, subject):
+    given = subject.blend.with_name("reference.exr")
+    write_picture(given, noisy(1, 99))
+    cycles.broken, cycles.error = (1, "0"), blender.EngineMissingError("This Blender has no engine CYCLES.")
+    reference = provide(subject, 256, VERSION, show)
+    assert reference.pictures == (given,)
+    assert not reference.is_noise_known
+
+
 def test_a_perfect_reference_beside_the_file_has_no_noise_worth_mentioning(cycles, subject):
     write_picture(subject.blend.with_name("reference.exr"), np.full((SIZE[1], SIZE[0], 3), TRUTH, np.float32))
     reference = provide(subject, 256, VERSION, show)

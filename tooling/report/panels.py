@@ -86,7 +86,7 @@ def panel(scene: SceneReport, metric: Metric) -> Panel:
     """What to draw of a scene. Points without a time above 0 or without a finite error are left away."""
     same = originals(scene.measurements)
     errors = [_finite(metric.of(each.judgement)) for each in scene.measurements]
-    noise = metric.noise(scene.reference) if metric.noise else None
+    noise = metric.noise(scene.reference) if metric.noise and scene.reference.is_noise_known else None
     zero, lowest = _lower_end([error for error in errors if error is not None], noise)
     dots: dict[str, list[tuple[Measurement, Dot]]] = {}
     for index, (each, error) in enumerate(zip(scene.measurements, errors, strict=True)):

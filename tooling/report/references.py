@@ -7,6 +7,7 @@ that it has are not rendered again; a reference of more samples takes over those
 
 import hashlib
 import json
+import math
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -123,15 +124,20 @@ def _is_given(subject: Subject, version: str) -> bool:
 def _given(subject: Subject, version: str, report_progress: blender.Tell) -> Reference:
     """The reference beside the .blend.
 
-    Its noise as FLIP is that of the mean of two pictures by Cycles, times how much less noise it has than they in RMSE.
+    Its noise as FLIP is that of the mean of two pictures by Cycles, times how much less noise it has than they in RMSE;
+    unknown where this Blender has no Cycles.
     """
     path = subject.blend.with_name(GIVEN)
-    parts = Parts(subject, subject.frames[0], CHECK_SAMPLES, version)
-    first, second = (centre(combined(each), subject.crop) for each in parts.provide(2, report_progress))
+    source = f"{GIVEN} beside {subject.blend.name}"
+    try:
+        parts = Parts(subject, subject.frames[0], CHECK_SAMPLES, version).provide(2, report_progress)
+    except blender.EngineMissingError:
+        return Reference(source, None, math.nan, math.nan, (path,))
+    first, second = (centre(combined(each), subject.crop) for each in parts)
     noise = noise_of(centre(combined(path), subject.crop), first, second)
     noise_of_both = noise_of_mean(first, second)
     share = noise / noise_of_both if noise_of_both else 0.0
-    return Reference(f"{GIVEN} beside {subject.blend.name}", None, noise, share * _apart(first, second), (path,))
+    return Reference(source, None, noise, share * _apart(first, second), (path,))
 
 
 def _rendered(subject: Subject, samples: int, version: str, report_progress: blender.Tell) -> Reference:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a report knows, as plain values: what the page, the tables and the plots are made of."""
 
+import math
 import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -31,7 +32,8 @@ class Subject:
 class Reference:
     """What pictures are judged by. `noise_rmse` (scene-linear) and `noise_flip` estimate how far it is from the truth.
 
-    `source` says where it is from, in words. `pictures`: scene-linear EXR files, one per frame.
+    Both are NaN where that is not known. `source` says where it is from, in words. `pictures`: scene-linear EXR files,
+    one per frame.
     """
 
     source: str
@@ -39,6 +41,11 @@ class Reference:
     noise_rmse: float
     noise_flip: float
     pictures: tuple[Path, ...]
+
+    @property
+    def is_noise_known(self) -> bool:
+        """Whether its noise could be estimated."""
+        return math.isfinite(self.noise_rmse) and math.isfinite(self.noise_flip)
 
 
 @dataclass(frozen=True)

@@ -32,10 +32,13 @@ def reference(scene: SceneReport) -> str:
     """What the pictures are judged by, and how far it can be trusted."""
     judge = scene.reference
     samples = f", {judge.samples:,} samples per pixel" if judge.samples else ""
-    text = (
-        f"Reference: {judge.source.rstrip('.')}{samples}. Its own remaining noise is estimated at FLIP "
-        f"{number(judge.noise_flip, 2)} and RMSE {number(judge.noise_rmse, 2)}: errors below that mean nothing."
+    noise = (
+        f"Its own remaining noise is estimated at FLIP {number(judge.noise_flip, 2)} and RMSE "
+        f"{number(judge.noise_rmse, 2)}: errors below that mean nothing."
+        if judge.is_noise_known
+        else "Its own remaining noise is not known, as it takes Cycles to estimate it."
     )
+    text = f"Reference: {judge.source.rstrip('.')}{samples}. {noise}"
     if scene.reference_flicker is not None:
         text += f" Its own flicker is {number(scene.reference_flicker, 2)}."
     return text

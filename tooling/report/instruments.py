@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a report is really made with: Blender in processes of its own, Cycles' references, FLIP, the page."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from addon.report.sweep import OURS, Point
+from tooling.console import ToolError
+from tooling.report import blender, judging, page, references
+from tooling.report.plan import Look
+from tooling.report.results import Judgement, Reference, Report, Run, Subject
+from tooling.report.run import Rendered, Working
+
+LAYERS_FILE = "layers.exr"
+"""How the names of our layer files end."""
+
+MOTION = {
+    "samples": "1",
+    "time_limit": "0",
+    "save_layers": "True",
+    "save_motion": "True",
+    "save_deep": "False",
+    "save_snapshot": "False",
+}
+"""Settings of ours that write depth and motion."""
+
+
+@dataclass(frozen=True)
+class BlenderInstruments:
+    """`tooling.report.run.Instruments` with the Blender of `python`.
+
+    `warm_seconds` are spent on warm renders of each process; references are rendered with `reference_samples`.
+    """
+
+    python: Path
+    warm_seconds: float
+    reference_samples: int
+
+    def look(self, blend: Path, resolution: tuple[int, int] | None) -> Look:
+        """Open a file."""
+        return blender.look(self.python, blend, resolution)
+
+    def reference(self, subject: Subject, version: str, working: Working) -> Reference:
+        """The one beside the file, or Cycles'."""
+        return references.provide(subject, self.reference_samples, version, working)
+
+    def layers(self, subject: Subject, folder: Path, working: Working) -> tuple[Path, ...]:
+        """One sample of every frame by our engine, which says how surfaces move."""
+        rendered = self._render(subject, blender.Render("motion", OURS, MOTION), folder, working)
+        files = tuple(path for path in rendered.files if path.name.endswith(LAYERS_FILE))
+        if len(files) != len(subject.frames):
+            raise ToolError(f"{len(files)} of {len(subject.frames)} frames have motion vectors.")
+        return files
+
+    def render(self, subject: Subject, point: Point, folder: Path, working: Working) -> Rendered:
+        """Render and time a point."""
+        render = blender.Render("point", point.engine, point.settings, self.warm_seconds)
+        rendered = self._render(subject, render, folder, working)
+        pictures = tuple(rendered.pictures[frame] for frame in subject.frames)
+        run = Run(rendered.cold, rendered.warm)
+        return Rendered(run, rendered.warnings, rendered.left_out, rendered.device, pictures)
+
+    def _render(self, subject: Subject, render: blender.Render, folder: Path, working: Working) -> blender.Rendered:
+        """What came of `render` in a process of its own."""
+        found: list[blender.Rendered] = []
+        blender.render(
+            self.python,
+            subject.blend,
+            subject.frames,
+            subject.resolution,
+            [render],
+            folder,
+            working,
+            lambda _render, rendered: found.append(rendered),
+        )
+        return found[0]
+
+    def judge(
+        self,
+        pictures: Sequence[Path],
+        reference: Reference,
+        subject: Subject,
+        layers: Sequence[Path] | None,
+        folder: Path,
+        name: str,
+    ) -> Judgement:
+        """Errors, FLIP and flicker."""
+        try:
+            return judging.judge(pictures, reference, subject, layers, folder, name)
+        except ValueError as error:
+            raise ToolError(f"{error}.") from error
+
+    def reference_flicker(
+        self, reference: Reference, subject: Subject, layers: Sequence[Path], folder: Path
+    ) -> float | None:
+        """Flicker of the reference's own frames."""
+        try:
+            return judging.judge_reference(reference, subject, layers, folder, f"{subject.name}_reference")[0]
+        except ValueError as error:
+            raise ToolError(f"{error}.") from error
+
+    def write(self, report: Report, folder: Path) -> None:
+        """Write the page."""
+        page.write(report, folder)
