@@ -184,7 +184,7 @@ class _Gathering:
             return None
         if not instance.is_instance and _has_hair(shown):
             self._messages.add_named(_HAIR, shown.name)
-        mesh = shown.data
+        mesh = shown.to_mesh() if shown.data.is_editmode else shown.data  # whose own polygons wait for the mode's end
         if len(mesh.polygons) == 0:
             if not (instance.is_instance or _is_instancer(shown)):
                 self._messages.add_named(_NO_FACES, shown.name)

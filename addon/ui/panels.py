@@ -260,12 +260,12 @@ class DEEP_GBUFFER_PT_statistics(EnginePanel, bpy.types.Panel):
         if last is None:
             self.layout.label(text="No final render yet.")
             return
-        _table(self.layout, "Time", [(label, f"{last[key]:.3f} s") for key, label in TIMES])
-        _table(self.layout, "Passes (last sample)", [(item["name"], f"{item['ms']:.2f} ms") for item in last["passes"]])
-        _table(self.layout, "Left out", [(item["name"], item["reason"]) for item in last["left_out"]])
-        _table(self.layout, "Memory", [(name, f"{size / 2**20:.1f} MiB") for name, size in last["bytes"].items()])
+        table(self.layout, "Time", [(label, f"{last[key]:.3f} s") for key, label in TIMES])
+        table(self.layout, "Passes (last sample)", [(item["name"], f"{item['ms']:.2f} ms") for item in last["passes"]])
+        table(self.layout, "Left out", [(item["name"], item["reason"]) for item in last["left_out"]])
+        table(self.layout, "Memory", [(name, f"{size / 2**20:.1f} MiB") for name, size in last["bytes"].items()])
         counts = [(key.capitalize(), f"{last[key]:,}") for key in ("samples", "triangles", "draws", "instances")]
-        _table(self.layout, "Scene", [*counts, ("Device", last["device"])])
+        table(self.layout, "Scene", [*counts, ("Device", last["device"])])
         self.layout.operator(DEEP_GBUFFER_OT_copy_statistics.bl_idname, icon="COPYDOWN")
 
 
@@ -278,7 +278,8 @@ TIMES = (
 )
 
 
-def _table(layout: Any, title: str, rows: list[tuple[str, str]]) -> None:
+def table(layout: Any, title: str, rows: list[tuple[str, str]]) -> None:
+    """A box with a title, and rows of name and value; nothing where there are no rows."""
     if not rows:
         return
     box = layout.box().column(align=True)

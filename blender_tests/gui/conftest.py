@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One run of a real Blender window; the tests look at what it left."""
+"""Runs of a real Blender window; the tests look at what they left."""
 
 import json
 import shutil
@@ -40,6 +40,10 @@ class WindowRun:
         left, top, width, height = self.results[name][index]
         return self._image(name)[top : top + height, left : left + width, :3]
 
+    def screen(self, name: str) -> np.ndarray:
+        """A whole screenshot, like `viewport`."""
+        return self._image(name)[..., :3]
+
     def final(self, name: str) -> np.ndarray:
         """A final render as Blender saved it, like `viewport`."""
         return self._image(f"{name}_final")[..., :3]
@@ -55,21 +59,29 @@ class WindowRun:
 
 @pytest.fixture(scope="session", name="window")
 def window_fixture(window_blender: Path, tmp_path_factory: pytest.TempPathFactory) -> WindowRun:
-    """The scenario of driver.py, run once with a scratch profile and the built zip."""
-    kept = tmp_path_factory.mktemp("window")
-    (window_blender / "var/tmp").mkdir(parents=True, exist_ok=True)
-    folder = Path(tempfile.mkdtemp(prefix="deep_gbuffer_", dir=window_blender / "var/tmp"))
+    """The scenario of driver.py, run once."""
+    return run_scenario(window_blender, tmp_path_factory.mktemp("window"), "driver.py")
+
+
+@pytest.fixture(scope="session", name="comparison")
+def comparison_fixture(window_blender: Path, tmp_path_factory: pytest.TempPathFactory) -> WindowRun:
+    """The scenario of comparison_driver.py, run once."""
+    return run_scenario(window_blender, tmp_path_factory.mktemp("comparison"), "comparison_driver.py")
+
+
+def run_scenario(root: Path, kept: Path, driver: str) -> WindowRun:
+    """Run a scenario in a fresh Blender with a scratch profile and the built zip; what it left goes to `kept`."""
+    (root / "var/tmp").mkdir(parents=True, exist_ok=True)
+    folder = Path(tempfile.mkdtemp(prefix="deep_gbuffer_", dir=root / "var/tmp"))
     try:
-        inside = Path("/") / folder.relative_to(window_blender)
+        inside = Path("/") / folder.relative_to(root)
         shutil.move(packaging.for_this_machine(kept, packaging.extension_tool()), folder / "extension.zip")
-        for name in ("driver.py", "xvfb.py"):
+        for name in (driver, "steps.py", "xvfb.py"):
             shutil.copy(HERE / name, folder)
         env = {"LIBGL_ALWAYS_SOFTWARE": "1", "HOME": str(inside), "BLENDER_USER_RESOURCES": str(inside / "profile")}
-        blender_window.run(
-            window_blender, ["blender", "--background", "--python-expr", PREFERENCES], env, TIMEOUT_SECONDS
-        )
-        command = ["python3", inside / "xvfb.py", "blender", "--python", inside / "driver.py", "--", inside]
-        done = blender_window.run(window_blender, [str(item) for item in command], env, TIMEOUT_SECONDS)
+        blender_window.run(root, ["blender", "--background", "--python-expr", PREFERENCES], env, TIMEOUT_SECONDS)
+        command = ["python3", inside / "xvfb.py", "blender", "--python", inside / driver, "--", inside]
+        done = blender_window.run(root, [str(item) for item in command], env, TIMEOUT_SECONDS)
         for path in [*folder.glob("*.png"), *folder.glob("*.json")]:
             shutil.copy(path, kept)
         return WindowRun(kept, done.stdout)

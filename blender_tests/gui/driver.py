@@ -1,74 +1,38 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Drives a real Blender window: blender --python driver.py -- FOLDER. Uses the add-on as a user does.
+"""Viewports and final renders in a real Blender window, as a user makes them. See steps.py.
 
-FOLDER holds extension.zip; screenshots (NAME.png), final renders (NAME_final.png) and results.json are written into
-it. The tests judge them; this only does and records.
+Final renders are written as NAME_final.png. This only does and records.
 """
 
-import json
 import math
-import os
 import subprocess
 import sys
 import threading
-import time
-import traceback
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Iterator
 
 import bpy
 
-FOLDER = Path(sys.argv[sys.argv.index("--") + 1])
-PACKAGE = "bl_ext.user_default.deep_gbuffer"
-STEP_SECONDS = 0.02
-PATIENCE_SECONDS = 60
+sys.path.append(sys.argv[sys.argv.index("--") + 1])
+
+from steps import (
+    FOLDER,
+    PACKAGE,
+    frames,
+    install,
+    main_region,
+    module,
+    results,
+    run,
+    screenshot,
+    viewports,
+    wait,
+    window,
+)
+
 SAMPLES = 8
 VARIANTS = ("TWO_PASS", "DELAY", "PREVIOUS", "REPROJECT")
 FILLS_THE_REGION = (2.0 - math.sqrt(2.0)) * 50.0
 """The camera view's zoom at which the camera's frame is as large as the region."""
-
-results: dict[str, object] = {}
-
-
-def module(name: str):
-    """A module of the installed extension."""
-    return sys.modules[f"{PACKAGE}.{name}"]
-
-
-def window():
-    return bpy.context.window_manager.windows[0]
-
-
-def viewports():
-    """Areas with a 3D viewport, from the left."""
-    return sorted((area for area in window().screen.areas if area.type == "VIEW_3D"), key=lambda area: area.x)
-
-
-def main_region(area):
-    return next(region for region in area.regions if region.type == "WINDOW")
-
-
-def screenshot(name: str) -> None:
-    """Save the screen, and where each viewport lies on it (left, top, width, height)."""
-    subprocess.run(["import", "-window", "root", str(FOLDER / f"{name}.png")], check=True)
-    regions = [main_region(area) for area in viewports()]
-    height = window().height
-    results[name] = [(region.x, height - region.y - region.height, region.width, region.height) for region in regions]
-
-
-def wait(ready: Callable[[], bool]) -> Iterator[None]:
-    """Let Blender work until `ready`."""
-    end = time.monotonic() + PATIENCE_SECONDS
-    while not ready():
-        if time.monotonic() > end:
-            raise TimeoutError(ready.__name__)
-        yield
-
-
-def frames(count: int) -> Iterator[None]:
-    """Let Blender work for some turns of its event loop."""
-    for _ in range(count):
-        yield
 
 
 def settled() -> bool:
@@ -98,13 +62,6 @@ def f12(name: str) -> Iterator[None]:
     yield from wait(lambda: bpy.app.is_job_running("RENDER"))
     yield from wait(lambda: not bpy.app.is_job_running("RENDER"))
     bpy.data.images["Render Result"].save_render(str(FOLDER / f"{name}_final.png"))
-
-
-def install() -> None:
-    """Install the zip through Blender's own installer."""
-    bpy.ops.extensions.package_install_files(
-        filepath=str(FOLDER / "extension.zip"), repo="user_default", enable_on_install=True
-    )
 
 
 def build_scene() -> None:
@@ -310,28 +267,4 @@ def leave(area) -> Iterator[None]:
     results["finished"] = True
 
 
-def main() -> None:
-    """Run the scenario between Blender's own events."""
-    running = scenario()
-
-    def step() -> float | None:
-        try:
-            next(running)
-        except StopIteration:
-            finish(0)
-        except Exception:
-            results["error"] = traceback.format_exc()
-            finish(1)
-        return STEP_SECONDS
-
-    bpy.app.timers.register(step, first_interval=0.5, persistent=True)
-
-
-def finish(code: int) -> None:
-    """Write the results and leave without questions about unsaved changes."""
-    (FOLDER / "results.json").write_text(json.dumps(results), encoding="utf-8")
-    sys.stdout.flush()
-    os._exit(code)
-
-
-main()
+run(scenario())
