@@ -30,9 +30,6 @@ SHARES = {OURS: 0.2, FIRST: 0.4, SECOND: 0.4}
 NO_FILES = {"save_layers": "False", "save_deep": "False", "save_snapshot": "False"}
 """Of our settings: only the picture is compared, and writing files beside it takes time."""
 
-UNLIMITED = {"time_limit": "0"}
-"""Of Cycles: as many samples as were asked for, however long that takes."""
-
 TITLES = {OURS: "Deep G-Buffer", FIRST: "Cycles, first half", SECOND: "Cycles, second half"}
 GRACE_SECONDS = 2.0
 TAIL_LINES = 5
@@ -99,6 +96,7 @@ class Comparison:
         self._made = {name: _Made() for name in SHARES}
         self._reason = ""
         surroundings = {name: str(request.folder) for name in ("TMPDIR", "TEMP", "TMP")}
+        surroundings["PYTHONPATH"] = python_path(request.package)
         try:
             self._child = subprocess.Popen(
                 [*request.blender, str(JOB), "--", json.dumps(job(request))],
@@ -195,14 +193,19 @@ class Comparison:
         self.progress = Progress(fraction, f"{TITLES[name]}: {counted[0] if counted else 'Preparing'}")
 
 
+def python_path(package: str) -> str:
+    """$PYTHONPATH with which a Python that has Blender as a module finds our add-on, named `package`, as this one did."""
+    place = Path(__file__).resolve().parents[package.count(".") + 2]
+    return os.pathsep.join(filter(None, (str(place), os.environ.get("PYTHONPATH"))))
+
+
 def job(request: Request) -> dict[str, Any]:
     """What `job.py` is told: one render of ours as the scene is set, and two of Cycles, with seeds of their own."""
-    installed = request.package.startswith("bl_ext.")
     halves = [
         {
             "name": name,
             "engine": "CYCLES",
-            "settings": {**REFERENCE_SETTINGS, **UNLIMITED, "samples": str(request.samples), "seed": str(seed)},
+            "settings": {**REFERENCE_SETTINGS, "samples": str(request.samples), "seed": str(seed)},
             "warm_seconds": 0.0,
         }
         for seed, name in enumerate((FIRST, SECOND))
@@ -213,9 +216,6 @@ def job(request: Request) -> dict[str, Any]:
         "frames": None,
         "resolution": list(request.resolution),
         "folder": str(request.folder),
-        "add_on": {
-            "package": request.package,
-            "folder": None if installed else str(Path(__file__).resolve().parents[request.package.count(".") + 2]),
-        },
+        "package": request.package,
         "renders": [{"name": OURS, "engine": "DEEP_GBUFFER", "settings": NO_FILES, "warm_seconds": 0.0}, *halves],
     }

@@ -29,7 +29,7 @@ def run(job: dict[str, Any]) -> None:
       frames               None: the file's current one
       resolution           (width, height) in pixels, None: the file's
       folder               where pictures go
-      add_on               our own: {package, folder}, see `job`
+      package              of our own add-on
       renders              each {name, engine: of ENGINES, settings: {property: text}, warm_seconds}
     and tells
       opened    {frame, resolution, blender}: the file's current frame, the pictures' size, Blender's version
@@ -38,7 +38,7 @@ def run(job: dict[str, Any]) -> None:
       done      {name, cold_s, warm_s, warnings, left_out, files, blender, device}, see `measure`
       failed    {name, reason, engine_missing}: that render has no picture; the others are made all the same
     """
-    package = job["add_on"]["package"]
+    package = job["package"]
     trouble = enable(package) if any(render["engine"] == OURS for render in job["renders"]) else ""
     rendering.stop_on_interrupt(package)
     scene = open_scene(job)
@@ -102,7 +102,7 @@ def measure(scene: bpy.types.Scene, job: dict[str, Any], index: int) -> dict[str
 
     def keep(frame: int) -> None:
         if ours:
-            said.append(rendering.own_statistics(job["add_on"]["package"], scene))
+            said.append(rendering.own_statistics(job["package"], scene))
         pictures[frame] = save(scene, Path(f"{stem}_frame_{frame}.exr"))
 
     cold, warm = timed(scene, job["frames"], render["warm_seconds"], keep)

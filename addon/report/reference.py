@@ -5,7 +5,12 @@ import numpy as np
 
 from ..scene.arrays import Float32Array
 
-UNBIASED = {"use_adaptive_sampling": "False", "sample_clamp_direct": "0", "sample_clamp_indirect": "0"}
+UNBIASED = {
+    "use_adaptive_sampling": "False",
+    "time_limit": "0",
+    "sample_clamp_direct": "0",
+    "sample_clamp_indirect": "0",
+}
 """Cycles with nothing stopped early and nothing cut off: the mean over samples tends to the truth."""
 
 REFERENCE_SETTINGS = {**UNBIASED, "use_denoising": "False"}

@@ -81,7 +81,11 @@ def _assignments(path: Path) -> Settings:
 
 
 OURS = "DEEP_GBUFFER"
-STRUCTURE = {"samples": "4"}
+NO_FILES = {"save_layers": "False", "save_deep": "False", "save_snapshot": "False"}
+"""What is measured is the picture, and files of the scene's own must not be written again."""
+
+PICTURE = {**NO_FILES, "debug_view": "NONE", "time_limit": "0"}
+STRUCTURE = {**PICTURE, "samples": "4"}
 """What the axes other than the number of samples are measured with."""
 
 DENOISED = {
@@ -94,9 +98,15 @@ DENOISED = {
 EEVEE = {"use_raytracing": "True"}
 
 SWEEP = (
-    Series("Samples", OURS, each("samples", (1, 4, 16, 64), "{} spp"), quick=("1 spp", "4 spp", "16 spp", "64 spp")),
-    Series("Quality preset", OURS, presets("sampling"), quick=("Draft",)),
-    Series("Resolution scale", OURS, each(PERCENT, (50, 71), "{} %"), STRUCTURE, quick=("50 %",)),
+    Series(
+        "Samples",
+        OURS,
+        each("samples", (1, 4, 16, 64), "{} spp"),
+        PICTURE,
+        quick=("1 spp", "4 spp", "16 spp", "64 spp"),
+    ),
+    Series("Quality preset", OURS, presets("sampling"), PICTURE, quick=("Draft",)),
+    Series("Resolution scale", OURS, each(PERCENT, (50, 75), "{} %"), STRUCTURE, quick=("50 %",)),
     Series("Layers", OURS, each("layers", (1, 2, 4, 8)), STRUCTURE, quick=("1", "4")),
     Series("Minimum separation", OURS, each("minimum_separation", (0, 0.05, 1), "{} m"), STRUCTURE),
     Series("Layer preset", OURS, presets("layers"), STRUCTURE),

@@ -49,14 +49,17 @@ def main(arguments: list[str]) -> int:
     expected = _peers.known((SHARED / "README.md").read_text(encoding="utf-8"))
     pairs = _peers.compare(expected, scenes)
     comparison = compared(pairs)
+    print(comparison)
+    if _peers.failures(pairs):
+        print(f"nothing was taken from {folder}")
+        return 1
     take_results(folder, [rows[0].scene for rows in scenes], comparison)
     readme = REPOSITORY / "README.md"
     block = readme_block(json.loads(text), scenes)
     readme.write_text(
         readme_tables.filled(readme.read_text(encoding="utf-8"), readme_tables.REPORT, block), encoding="utf-8"
     )
-    print(comparison)
-    return 1 if _peers.failures(pairs) else 0
+    return 0
 
 
 def compared(pairs: Sequence[_peers.Pair]) -> str:

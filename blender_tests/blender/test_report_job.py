@@ -2,6 +2,7 @@
 """The report's job inside Blender: what it renders, how often, and that nothing of one render is left in the next."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -20,6 +21,7 @@ from tooling.console import ToolError
 from tooling.report import blender
 
 SIZE = (96, 54)
+SURROUNDINGS = {**os.environ, "PYTHONPATH": str(Path(measuring.__file__).parents[2])}
 MANY = "60000"  # minutes of work
 A_WARM_RENDER = 1e-6  # seconds: one takes longer
 OURS_ONCE = {"name": "ours", "engine": "DEEP_GBUFFER", "settings": {"samples": "1"}}
@@ -58,7 +60,7 @@ def cornell_fixture(repository):
 def command(repository, file, folder, renders, *, prelude=None, **changes):
     """The command line of a job of these renders; `prelude` runs the script it is given."""
     job = {"file": str(file), "scene": None, "frames": None, "resolution": SIZE, "folder": str(folder)}
-    job |= {"add_on": {"package": "addon", "folder": str(repository)}, **changes}
+    job |= {"package": "addon", **changes}
     job["renders"] = [{"warm_seconds": 0, **render} for render in renders]
     script = str(repository / "addon" / "report" / "job.py")
     return [sys.executable, "-P", *(["-c", prelude] if prelude else []), script, "--", json.dumps(job)]
@@ -66,7 +68,9 @@ def command(repository, file, folder, renders, *, prelude=None, **changes):
 
 def run(*arguments, **changes):
     """Run a job to its end."""
-    child = subprocess.run(command(*arguments, **changes), stdout=subprocess.PIPE, text=True, check=False)
+    child = subprocess.run(
+        command(*arguments, **changes), env=SURROUNDINGS, stdout=subprocess.PIPE, text=True, check=False
+    )
     messages = [message for line in child.stdout.split("\n") if (message := read(line))]
     return Told(child.returncode, messages)
 
@@ -181,6 +185,7 @@ def test_an_interrupt_ends_it_and_leaves_whole_pictures_only(repository, cornell
     endless = {"name": "endless", "engine": engine, "settings": {"samples": MANY}}
     child = subprocess.Popen(
         command(repository, cornell, tmp_path, [{**OURS_ONCE, "name": "first"}, endless]),
+        env=SURROUNDINGS,
         stdout=subprocess.PIPE,
         text=True,
     )

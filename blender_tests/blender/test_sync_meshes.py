@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Meshes: what arrives, however Blender stores it, and what is done about broken ones."""
 
+import bmesh
 import bpy
 import numpy as np
 import pytest
@@ -257,3 +258,17 @@ def test_kinds_that_are_not_rendered_are_named(empty_scene):
     texts = sync().warnings
     assert any("“Smoke”" in text and "olume" in text for text in texts)
     assert any("“Fur”" in text and "urves" in text for text in texts)
+
+
+def test_a_mesh_in_edit_mode_is_as_it_is_being_edited(empty_scene):
+    thing = make_object(vertices=[(0, 0, 0), (1, 0, 0), (0, 1, 0)], faces=[(0, 1, 2)])
+    bpy.context.view_layer.objects.active = thing
+    bpy.ops.object.mode_set(mode="EDIT")
+    edited = bmesh.from_edit_mesh(thing.data)
+    bmesh.ops.translate(edited, vec=(0.0, 0.0, 5.0), verts=edited.verts)
+    bmesh.update_edit_mesh(thing.data)
+    mirror = Mirror()
+    mesh = only_mesh(sync(mirror).scene)
+    assert np.unique(corner_positions(mesh)[..., 2]) == [5.0]
+    assert only_mesh(sync(mirror).scene) is mesh
+    bpy.ops.object.mode_set(mode="OBJECT")

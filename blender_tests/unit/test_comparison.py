@@ -2,6 +2,7 @@
 """A comparison's process, its messages and its numbers, with a program in Blender's place."""
 
 import json
+import os
 import sys
 from pathlib import Path
 
@@ -10,7 +11,18 @@ import pytest
 
 from addon.output import write_channels
 from addon.report import compared
-from addon.report.comparison import FIRST, OURS, SECOND, SHARES, Comparison, ComparisonError, Render, Request, job
+from addon.report.comparison import (
+    FIRST,
+    OURS,
+    SECOND,
+    SHARES,
+    Comparison,
+    ComparisonError,
+    Render,
+    Request,
+    job,
+    python_path,
+)
 from addon.report.messages import MARK
 
 SAYS = "import sys, time; sys.stdout.write({text!r}); sys.stdout.flush(); time.sleep({seconds})"
@@ -54,13 +66,9 @@ def test_the_job_is_ours_as_it_is_set_and_two_independent_halves_of_cycles(tmp_p
     assert json.loads(json.dumps(told)) == told
 
 
-@pytest.mark.parametrize(
-    ("package", "folder"),
-    [("addon", str(Path(compared.__file__).parents[2])), ("bl_ext.user_default.deep_gbuffer", None)],
-)
-def test_the_job_says_where_the_add_on_is(tmp_path, package, folder):
-    told = job(request(tmp_path / "work", package=package))
-    assert told["add_on"] == {"package": package, "folder": folder}
+def test_a_python_that_is_started_finds_the_add_on(monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", "elsewhere")
+    assert python_path("addon").split(os.pathsep) == [str(Path(compared.__file__).parents[2]), "elsewhere"]
 
 
 def test_progress_grows_from_render_to_render_and_never_shrinks(tmp_path):

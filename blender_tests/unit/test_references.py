@@ -187,7 +187,7 @@ def test_the_cache_tells_resolutions_and_settings_apart(cycles, subject, monkeyp
     parts = Parts(subject, 1, 64, VERSION)
     before = parts.folder
     assert replace(parts, subject=replace(subject, resolution=(48, 64))).folder != before
-    monkeypatch.setitem(references.SETTINGS, "sample_clamp_indirect", "10")
+    monkeypatch.setitem(references.REFERENCE_SETTINGS, "sample_clamp_indirect", "10")
     assert parts.folder != before
 
 
@@ -201,6 +201,12 @@ def test_a_reference_beside_the_file_is_taken_and_checked_by_two_pictures(cycles
     assert reference.noise_rmse == pytest.approx(NOISE, rel=0.06)
     provide(subject, 256, VERSION, show)
     assert len(cycles.rendered) == 2
+
+
+def test_a_reference_beside_the_file_that_shows_something_else_is_refused(cycles, subject):
+    write_picture(subject.blend.with_name("reference.exr"), noisy(1, 99) + np.float32(10.0 * NOISE))
+    with pytest.raises(ToolError, match="reference.exr beside box.blend does not show this file"):
+        provide(subject, 256, VERSION, show)
 
 
 def test_a_reference_beside_the_file_is_taken_without_cycles_too(cycles, subject):

@@ -45,6 +45,12 @@ def test_a_preset_is_what_its_file_says_of_final_renders():
     assert sweep.presets("sampling")["Draft"] == {"samples": "4", "time_limit": "0.0"}
 
 
+def test_nothing_of_the_files_own_stops_a_measurement_early():
+    """Workbench and EEVEE have no time limit."""
+    limited = (point for point in sweep.points(quick=False) if point.engine in {sweep.OURS, "CYCLES"})
+    assert {float(point.settings["time_limit"]) for point in limited} == {0.0}
+
+
 def test_a_value_wins_over_the_base():
     series = sweep.Series("Samples", sweep.OURS, sweep.each("samples", (7,), "{} spp"), {"samples": "4", "seed": "1"})
     (point,) = series.points(quick=False)

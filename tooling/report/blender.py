@@ -13,7 +13,7 @@ from tooling.console import ToolError
 from tooling.report.plan import Look
 
 JOB = places.REPOSITORY / "addon" / "report" / "job.py"
-ADD_ON = {"package": "addon", "folder": str(places.REPOSITORY)}
+PACKAGE = "addon"
 SHADER_CACHES = ("MESA_SHADER_CACHE_DIR", "__GL_SHADER_DISK_CACHE_PATH")
 """Where Mesa's and NVIDIA's OpenGL keep compiled shaders."""
 
@@ -142,7 +142,7 @@ class _Work:
 
 def _job(blend: Path, frames: Sequence[int] | None, resolution: tuple[int, int] | None) -> dict[str, Any]:
     """What every job says of its file and of our add-on."""
-    return {"file": str(blend.resolve()), "scene": None, "frames": frames, "resolution": resolution, "add_on": ADD_ON}
+    return {"file": str(blend.resolve()), "scene": None, "frames": frames, "resolution": resolution, "package": PACKAGE}
 
 
 def _run(python: Path, job: Mapping[str, Any], scratch: Path, take: jobs.Take, has_all: Callable[[], bool]) -> None:
@@ -150,4 +150,5 @@ def _run(python: Path, job: Mapping[str, Any], scratch: Path, take: jobs.Take, h
     caches = {name: str(scratch / name) for name in SHADER_CACHES}
     for folder in caches.values():
         Path(folder).mkdir()
-    jobs.run([str(python), "-P", str(JOB), "--", json.dumps(job)], scratch, take, has_all, caches)
+    command = [str(python), "-P", str(JOB), "--", json.dumps(job)]
+    jobs.run(command, scratch, take, has_all, {**caches, "PYTHONPATH": str(places.REPOSITORY)})

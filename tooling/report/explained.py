@@ -22,7 +22,7 @@ TERMS = (
         "FLIP",
         "lower is better",
         "How different two pictures look to a person who flips between them, by NVIDIA's FLIP: 0 is equal, 1 as "
-        "different as can be. It judges pictures as displayed.",
+        "different as can be. It judges pictures as displayed, with the view transform Standard whatever the file's.",
     ),
     (
         "RMSE",
@@ -37,7 +37,7 @@ TERMS = (
     (
         "PSNR",
         "higher is better",
-        "Peak signal-to-noise ratio of the pictures as displayed, in decibels; ∞ for equal pictures.",
+        "Peak signal-to-noise ratio of the pictures as displayed (Standard), in decibels; ∞ for equal pictures.",
     ),
     (
         "bias",

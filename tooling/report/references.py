@@ -33,8 +33,9 @@ PART_SAMPLES = 64
 CHECK_SAMPLES = 32
 """Samples of each of the two pictures that a given reference's noise is estimated by."""
 
-SETTINGS = {**REFERENCE_SETTINGS, "time_limit": "0"}
-"""Of Cycles; everything else but samples and seed is the file's."""
+TOO_NOISY = 2.0
+"""Noise of a given reference, over that of those pictures' mean, that says it is of something else: a quarter of the
+samples."""
 
 
 def provide(subject: Subject, samples: int, version: str, report_progress: blender.Tell) -> Reference:
@@ -67,7 +68,7 @@ class Parts:
     @property
     def settings(self) -> dict[str, str]:
         """Cycles' settings for all of them."""
-        return {**SETTINGS, "samples": str(self.samples)}
+        return {**REFERENCE_SETTINGS, "samples": str(self.samples)}
 
     @property
     def folder(self) -> Path:
@@ -125,7 +126,7 @@ def _given(subject: Subject, version: str, report_progress: blender.Tell) -> Ref
     """The reference beside the .blend.
 
     Its noise as FLIP is that of the mean of two pictures by Cycles, times how much less noise it has than they in RMSE;
-    unknown where this Blender has no Cycles.
+    unknown where this Blender has no Cycles. Raises ToolError where it is further from the two than noise explains.
     """
     path = subject.blend.with_name(GIVEN)
     source = f"{GIVEN} beside {subject.blend.name}"
@@ -136,6 +137,11 @@ def _given(subject: Subject, version: str, report_progress: blender.Tell) -> Ref
     first, second = (centre(combined(each), subject.crop) for each in parts)
     noise = noise_of(centre(combined(path), subject.crop), first, second)
     noise_of_both = noise_of_mean(first, second)
+    if noise > TOO_NOISY * noise_of_both:
+        raise ToolError(
+            f"{source} does not show this file as Cycles renders it now, or has more noise than "
+            f"{CHECK_SAMPLES // 2} samples; without it Cycles renders one."
+        )
     share = noise / noise_of_both if noise_of_both else 0.0
     return Reference(source, None, noise, share * _apart(first, second), (path,))
 
