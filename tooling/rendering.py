@@ -164,12 +164,9 @@ class Run:
 
 def put_in_place(source: Path, target: Path) -> None:
     """Move a finished file to `target` so that `target` is never half a file. Raises ToolError where it cannot be."""
-    draft = target.with_name(f".{target.name}.{os.getpid()}")
     try:
-        shutil.copyfile(source, draft)
-        draft.replace(target)
+        with places.replacing(target) as draft:
+            shutil.copyfile(source, draft)
     except OSError as error:
         raise ToolError(f"{target} could not be written: {error.strerror}.") from error
-    finally:
-        draft.unlink(missing_ok=True)
     source.unlink()

@@ -21,14 +21,12 @@ from typing import Any
 
 from .messages import INTERRUPTED, read
 from .reference import REFERENCE_SETTINGS
+from .sweep import NO_FILES
 
 JOB = Path(__file__).with_name("job.py")
 OURS, FIRST, SECOND = "ours", "first half", "second half"
 SHARES = {OURS: 0.2, FIRST: 0.4, SECOND: 0.4}
 """The renders in their order, and how much of the progress each is."""
-
-NO_FILES = {"save_layers": "False", "save_deep": "False", "save_snapshot": "False"}
-"""Of our settings: only the picture is compared, and writing files beside it takes time."""
 
 TITLES = {OURS: "Deep G-Buffer", FIRST: "Cycles, first half", SECOND: "Cycles, second half"}
 GRACE_SECONDS = 2.0
@@ -194,7 +192,7 @@ class Comparison:
 
 
 def python_path(package: str) -> str:
-    """$PYTHONPATH with which a Python that has Blender as a module finds our add-on, named `package`, as this one did."""
+    """$PYTHONPATH with which a Python that has Blender as a module finds our add-on, named `package`, as we did."""
     place = Path(__file__).resolve().parents[package.count(".") + 2]
     return os.pathsep.join(filter(None, (str(place), os.environ.get("PYTHONPATH"))))
 

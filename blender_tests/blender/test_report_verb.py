@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A small report with real renders: interrupted, gone on with, and with a file that is broken."""
 
+import subprocess
 import sys
 from pathlib import Path
 
+import bpy
 import pytest
 
 pytest.importorskip("flip_evaluator")
@@ -11,8 +13,10 @@ pytest.importorskip("flip_evaluator")
 from addon.report.reference import REFERENCE_SETTINGS
 from addon.report.sweep import Point
 from tooling import environments
+from tooling.report import device
 from tooling.report.instruments import BlenderInstruments
-from tooling.report.run import Options, make
+from tooling.report.interfaces import Options
+from tooling.report.run import make
 
 OURS = Point("Samples", "1 spp", "DEEP_GBUFFER", {"samples": "1"})
 CYCLES = Point("Cycles", "1 spp", "CYCLES", {**REFERENCE_SETTINGS, "samples": "1"})
@@ -69,10 +73,11 @@ def test_an_interrupted_report_goes_on_and_repeats_nothing(options, tmp_path):
     assert scene.reference.noise_rmse > 0.0
     assert [each.point for each in scene.measurements] == [OURS, CYCLES]
     for each in scene.measurements:
-        assert each.cold.least > 0.0
+        assert each.runs[0].cold > 0.0
         assert each.warm.count >= 1
         assert 0.0 < each.judgement.flip < 1.0
         assert each.judgement.picture.is_file()
+    assert second.pages[-1].machine.endswith(f"; {device.name()}")  # what it is kept for is what Blender drew with
     assert scene.measurements[0].left_out  # our engine says what this scene does not need
 
 
@@ -96,3 +101,17 @@ def test_a_broken_file_is_a_problem_and_the_others_are_measured(options, tmp_pat
     assert "broken.blend" in problem
     assert [scene.subject.name for scene in instruments.pages[-1].scenes] == ["cornell_box"]
     assert len(instruments.pages[-1].scenes[0].measurements) == 1
+
+
+def test_the_verb_fails_with_a_sentence_where_the_only_file_is_broken(repository, tmp_path):
+    broken, folder = tmp_path / "broken.blend", tmp_path / "report"
+    broken.write_bytes((repository / "scenes" / "cornell_box.blend").read_bytes()[:1000])
+    version = ".".join(str(number) for number in bpy.app.version[:2])
+    command = [sys.executable, str(repository / "build.py"), "report", str(broken), "-o", str(folder), "--quick"]
+    ended = subprocess.run([*command, "--blender", version], capture_output=True, text=True, check=False)
+    assert ended.returncode == 1, ended.stderr
+    assert "error: 1 of what was asked for could not be measured:\n  broken is left out: " in ended.stderr
+    assert "broken.blend" in ended.stderr
+    assert "Traceback" not in ended.stderr
+    assert ended.stdout.rstrip().endswith(f"wrote {folder / 'index.html'}")
+    assert "broken is left out" in (folder / "index.html").read_text(encoding="utf-8")

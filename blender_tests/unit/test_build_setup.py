@@ -83,6 +83,29 @@ def test_a_cached_folder_that_stopped_working_is_made_again(tmp_path, monkeypatc
     assert (again / "interpreter").exists()
 
 
+def test_a_file_is_replaced_by_a_whole_one_or_not_at_all(tmp_path):
+    path = tmp_path / "new" / "picture.png"
+    with places.replacing(path) as draft:
+        assert draft.suffix == ".png"
+        draft.write_text("first", encoding="utf-8")
+        assert not path.exists()
+    with pytest.raises(UnicodeEncodeError), places.replacing(path) as draft:
+        draft.write_text("half\udc00", encoding="utf-8")
+    assert path.read_text(encoding="utf-8") == "first"
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_a_finished_picture_that_cannot_be_put_in_place_is_named(tmp_path):
+    source, target = tmp_path / "scratch.png", tmp_path / "out.png"
+    source.write_bytes(b"picture")
+    target.mkdir()
+    with pytest.raises(ToolError, match=r"out\.png could not be written: "):
+        rendering.put_in_place(source, target)
+    target.rmdir()
+    rendering.put_in_place(source, target)
+    assert (target.read_bytes(), list(tmp_path.iterdir())) == (b"picture", [target])
+
+
 def test_a_wheel_that_went_away_is_noticed(tmp_path):
     names = ["a-1-cp311-cp311-any.whl", "a-1-cp313-cp313-any.whl"]
     assert not packaging.has_all_wheels(tmp_path)

@@ -3,7 +3,9 @@
 
 import json
 import os
+import signal
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +28,9 @@ from addon.report.comparison import (
 from addon.report.messages import MARK
 
 SAYS = "import sys, time; sys.stdout.write({text!r}); sys.stdout.flush(); time.sleep({seconds})"
+
+DEAF = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_IGN); print('ready', flush=True); time.sleep(60)"
+"""Ignores what `cancel` says first."""
 
 
 def request(folder, says=(), seconds=0, package="addon"):
@@ -116,6 +121,16 @@ def test_cancelling_ends_a_process_that_works(tmp_path):
         comparison.cancel()
     assert comparison._child.returncode != 0
     assert not comparison._reader.is_alive()
+    assert not (tmp_path / "work").exists()
+
+
+def test_cancelling_ends_a_process_that_does_not_listen(tmp_path, monkeypatch):
+    monkeypatch.setattr("addon.report.comparison.GRACE_SECONDS", 0.01)
+    deaf = Comparison(replace(request(tmp_path / "work"), blender=[sys.executable, "-c", DEAF]))
+    while deaf._lines.empty():
+        assert deaf._reader.is_alive()
+    deaf.cancel()
+    assert deaf._child.returncode == -signal.SIGKILL
     assert not (tmp_path / "work").exists()
 
 

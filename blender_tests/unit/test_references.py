@@ -212,7 +212,7 @@ def test_a_reference_beside_the_file_that_shows_something_else_is_refused(cycles
 def test_a_reference_beside_the_file_is_taken_without_cycles_too(cycles, subject):
     given = subject.blend.with_name("reference.exr")
     write_picture(given, noisy(1, 99))
-    cycles.broken, cycles.error = (1, "0"), blender.EngineMissingError("This Blender has no engine CYCLES.")
+    cycles.broken, cycles.error = (1, "0"), blender.NoEngineError("This Blender has no engine CYCLES.")
     reference = provide(subject, 256, VERSION, show)
     assert reference.pictures == (given,)
     assert not reference.is_noise_known
@@ -244,7 +244,7 @@ def test_a_broken_reference_beside_the_file_is_named(cycles, subject):
 
 
 def test_without_cycles_there_is_a_sentence_until_the_parts_are_in_the_cache(cycles, subject):
-    missing = blender.EngineMissingError("This Blender (5.2.3 LTS) has no engine CYCLES.")
+    missing = blender.NoEngineError("This Blender (5.2.3 LTS) has no engine CYCLES.")
     cycles.broken, cycles.error = (1, "0"), missing
     with pytest.raises(ToolError, match=r"box has no reference: This Blender \(5.2.3 LTS\) has no engine CYCLES."):
         provide(subject, 128, VERSION, show)

@@ -135,6 +135,20 @@ def test_a_report_that_is_not_finished_says_so():
     assert "Nothing of this scene" in markdown
 
 
+@pytest.mark.parametrize(
+    ("days", "made_words"),
+    [
+        (("2026-11-22",), "2026-11-22"),
+        (("2026-11-20",), "2026-11-22, measured on 2026-11-20"),
+        (("2026-11-20", "2026-10-31", "2026-11-22"), "2026-11-22, measured from 2026-10-31 to 2026-11-22"),
+    ],
+)
+def test_days_of_measurements_are_told_where_they_are_not_the_reports(days, made_words):
+    made = report(scene([measurement(days=days[:1])]), scene([measurement(days=days[1:])]))
+    assert f"Made {made_words} The command" in said(read(html_page.document(made, [Media(), Media()])))
+    assert f", {made_words}.\n\n" in markdown_page.document(made, [[], []])
+
+
 def test_sequences_have_a_column_of_flicker_and_single_frames_have_none():
     still = scene([measurement()])
     moving = replace(still, subject=replace(still.subject, frames=(1, 2)), reference_flicker=0.012)

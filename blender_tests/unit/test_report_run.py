@@ -10,10 +10,12 @@ import pytest
 from addon.report.metrics import Errors
 from addon.report.sweep import Point
 from tooling.console import ToolError
-from tooling.report.blender import EngineMissingError
+from tooling.report import run
+from tooling.report.blender import NoEngineError
+from tooling.report.interfaces import Options, Rendered
 from tooling.report.plan import Look
 from tooling.report.results import Judgement, Reference, Run
-from tooling.report.run import Options, Rendered, make
+from tooling.report.run import make
 from tooling.report.store import Store, WriteError
 
 FAST = Point("Samples", "1 spp", "DEEP_GBUFFER", {"samples": "1"})
@@ -29,6 +31,8 @@ class Stand:
     `rendered`: (scene, label of the series and point, …) in order. `trouble`: asked before each render what to raise.
     """
 
+    warm_seconds = 1.0
+
     def __init__(self):
         self.rendered = []
         self.judged = []
@@ -36,6 +40,11 @@ class Stand:
         self.pages = []
         self.trouble = lambda subject, point: None
         self.judge_trouble = None
+        self.motion_trouble = None
+        self.flicker = 0.5
+
+    def device(self):
+        return "a rasteriser"
 
     def look(self, blend, resolution):
         if b"broken" in blend.read_bytes():
@@ -51,6 +60,8 @@ class Stand:
 
     def layers(self, subject, folder, working):
         self.moved.append(subject.name)
+        if self.motion_trouble:
+            raise self.motion_trouble
         return tuple(folder / f"{frame}.exr" for frame in subject.frames)
 
     def render(self, subject, point, folder, working):
@@ -65,17 +76,18 @@ class Stand:
     def judge(self, pictures, reference, subject, layers, folder, name):
         if self.judge_trouble:
             raise self.judge_trouble
-        assert (layers is None) == (len(subject.frames) == 1)
+        assert (layers is None) == (len(subject.frames) == 1 or self.motion_trouble is not None)
         self.judged.append((subject.name, name))
         folder.mkdir(parents=True, exist_ok=True)
         for path in (folder / f"{name}.png", folder / f"{name}_flip.png"):
             path.write_bytes(b"")
         errors = Errors(0.1, 0.2, 30.0, (0.0, 0.0, 0.0), 0.0, 0)
-        return Judgement(errors, 0.3, None, "digest", folder / f"{name}.png", folder / f"{name}_flip.png")
+        flicker = None if layers is None else 0.1
+        return Judgement(errors, 0.3, flicker, "digest", folder / f"{name}.png", folder / f"{name}_flip.png")
 
-    def reference_flicker(self, reference, subject, layers, folder):
+    def reference_flicker(self, reference, subject, layers):
         assert len(layers) == len(subject.frames)
-        return 0.5
+        return self.flicker
 
     def write(self, report, folder):
         (folder / "index.html").write_text("page", encoding="utf-8")
@@ -172,14 +184,6 @@ def test_more_rounds_add_to_what_is_there(options):
     assert [len(each.runs) for each in more.pages[-1].scenes[0].measurements] == [3] * len(POINTS)
 
 
-def test_points_that_render_the_same_are_measured_under_their_first_name(options):
-    stand = Stand()
-    twin = dataclasses.replace(FAST, series="Preset", label="Draft")
-    make(options, (FAST, twin), stand)
-    assert stand.rendered == [("room", "Samples", "1 spp")] * 2
-    assert [each.point for each in stand.pages[-1].scenes[0].measurements] == [FAST]
-
-
 def test_a_point_that_fails_is_one_problem_and_the_others_go_on(options, capfd):
     stand = Stand()
     stand.trouble = lambda subject, point: ToolError("It ran out of memory.") if point == SLOW else None
@@ -198,7 +202,7 @@ def test_a_missing_engine_is_one_problem_and_tried_once(options, tmp_path):
         if point.engine != "CYCLES":
             return None
         tried.append(point)
-        return EngineMissingError("This Blender (5.2.3 LTS) has no engine CYCLES.")
+        return NoEngineError("This Blender (5.2.3 LTS) has no engine CYCLES.")
 
     stand.trouble = no_cycles
     (problem,) = make(with_scenes(options, scene(tmp_path), scene(tmp_path, "hall", "a hall")), POINTS, stand)
@@ -218,10 +222,148 @@ def test_a_scene_that_cannot_be_measured_is_a_problem_and_the_others_go_on(optio
     assert [room.subject.name for room in stand.pages[-1].scenes] == ["room"]
 
 
-def test_where_no_scene_can_be_opened_there_is_no_page(options, tmp_path):
+def test_where_no_scene_can_be_opened_the_page_says_so(options, tmp_path, capfd):
+    """In place of an old page, which would look like what was asked for now."""
     stand = Stand()
-    assert len(make(with_scenes(options, scene(tmp_path, "bad", "broken")), POINTS, stand)) == 1
-    assert (stand.pages, stand.rendered) == ([], [])
+    (problem,) = make(with_scenes(options, scene(tmp_path, "bad", "broken")), POINTS, stand)
+    assert stand.rendered == []
+    assert [(page.scenes, page.problems, page.blender) for page in stand.pages] == [((), (problem,), "unknown")]
+    assert f"wrote {options.folder / 'index.html'}" in capfd.readouterr().out
+
+
+def test_without_a_new_page_none_is_said_to_be_written(options, tmp_path, capfd):
+    (options.folder / "index.html").write_text("an old page", encoding="utf-8")
+    stand = Stand()
+    stand.device = interrupt
+    with pytest.raises(KeyboardInterrupt):
+        make(options, POINTS, stand)
+    assert "wrote" not in capfd.readouterr().out
+
+
+def interrupt(*_unused):
+    raise KeyboardInterrupt
+
+
+def no_space(*_unused, **_how):
+    raise OSError(errno.ENOSPC, "No space left on device", "/scratch/room")
+
+
+@pytest.mark.parametrize(("trouble", "kind"), [(interrupt, KeyboardInterrupt), (no_space, ToolError)])
+def test_a_page_is_not_replaced_before_every_scene_was_looked_at(options, tmp_path, monkeypatch, trouble, kind):
+    both = with_scenes(options, scene(tmp_path), scene(tmp_path, "hall", "a hall"))
+    make(both, POINTS, Stand())
+    again = Stand()
+    look = again.look
+    again.look = lambda blend, resolution: look(blend, resolution) if blend.stem == "room" else trouble()
+    with pytest.raises(kind):
+        make(both, POINTS, again)
+    assert again.pages == []
+
+
+def test_a_full_folder_for_temporary_files_is_told_of_and_the_page_is_written(options, monkeypatch):
+    stand = Stand()
+    fill = len(POINTS)
+    stand.trouble = lambda subject, point: no_space() if len(stand.rendered) == fill else None
+    with pytest.raises(ToolError, match=r"^/scratch/room: No space left on device\. What was finished before is kept"):
+        make(options, POINTS, stand)
+    assert len(stand.pages[-1].scenes[0].measurements) == len(POINTS)
+    monkeypatch.setattr("tempfile.mkdtemp", no_space)
+    with pytest.raises(ToolError, match=r"^/scratch/room: No space left on device"):
+        make(options, POINTS, Stand())
+
+
+def test_no_folder_for_temporary_files_is_told_of(options, monkeypatch):
+    monkeypatch.setenv("TMPDIR", "/nowhere")
+    monkeypatch.setattr("tempfile.tempdir", None)
+    monkeypatch.setattr("tempfile._get_default_tempdir", _no_folder)
+    with pytest.raises(ToolError, match=r"^No usable temporary directory found in \['/nowhere'\]\. What"):
+        make(options, POINTS, Stand())
+
+
+def _no_folder(*_unused):
+    raise FileNotFoundError(errno.ENOENT, "No usable temporary directory found in ['/nowhere']")
+
+
+def test_a_file_that_cannot_be_read_is_a_problem_and_the_others_go_on(options, tmp_path):
+    """It goes away while its reference is made."""
+    stand = Stand()
+    reference = stand.reference
+
+    def lose(subject, version, working):
+        made = reference(subject, version, working)
+        if subject.name == "lost":
+            subject.blend.unlink()
+        return made
+
+    stand.reference = lose
+    (problem,) = make(with_scenes(options, scene(tmp_path, "lost", "a cave"), scene(tmp_path)), POINTS, stand)
+    assert problem.startswith(f"lost is left out: {tmp_path / 'lost.blend'} could not be read: ")
+    assert [len(room.measurements) for room in stand.pages[-1].scenes] == [len(POINTS)]
+
+
+def test_what_was_measured_before_is_dated(options, monkeypatch):
+    monkeypatch.setattr(run, "date", Day("2026-11-02"))
+    make(dataclasses.replace(options, rounds=1), POINTS, Stand())
+    monkeypatch.setattr(run, "date", Day("2026-11-22"))
+    first, second = Stand(), Stand()
+    make(dataclasses.replace(options, rounds=1), POINTS, first)
+    assert first.pages[-1].made == "2026-11-22, measured on 2026-11-02"
+    make(options, POINTS, second)
+    assert second.pages[-1].made == "2026-11-22, measured from 2026-11-02 to 2026-11-22"
+
+
+def test_what_was_measured_today_needs_no_other_date(options):
+    stand = Stand()
+    make(options, POINTS, stand)
+    assert stand.pages[-1].made == stand.pages[-1].date
+
+
+class Day:
+    """Stands for datetime.date, where today is this."""
+
+    def __init__(self, today):
+        self._today = today
+
+    def today(self):
+        return self
+
+    def isoformat(self):
+        return self._today
+
+
+def test_another_device_is_measured_and_judged_again(options):
+    make(options, POINTS, Stand())
+    other = Stand()
+    other.device = lambda: "a graphics card"
+    make(options, POINTS, other)
+    assert len(other.rendered) == 2 * len(POINTS)
+    assert len(other.judged) == len(POINTS)
+
+
+def test_other_warm_seconds_are_measured_again_but_not_judged(options):
+    make(options, POINTS, Stand())
+    longer = Stand()
+    longer.warm_seconds = 4.0
+    make(options, POINTS, longer)
+    assert len(longer.rendered) == 2 * len(POINTS)
+    assert longer.judged == []
+
+
+def test_a_sequence_without_motion_is_judged_but_for_flicker(options):
+    sequence = dataclasses.replace(options, frames=(1, 2, 3))
+    still, again, moving = Stand(), Stand(), Stand()
+    for stand in (still, again):
+        stand.motion_trouble = ToolError("No OpenGL.")
+        (problem,) = make(sequence, POINTS, stand)
+        assert problem == "The flicker of room is left out: No OpenGL."
+        (room,) = stand.pages[-1].scenes
+        assert room.problems == (problem,)
+        assert [each.judgement.flicker for each in room.measurements] == [None] * len(POINTS)
+    assert again.rendered == []
+    assert make(sequence, POINTS, moving) == []
+    (room,) = moving.pages[-1].scenes
+    assert [each.judgement.flicker for each in room.measurements] == [0.1] * len(POINTS)
+    assert room.reference_flicker == 0.5
 
 
 def test_a_rectangle_larger_than_the_picture_is_a_problem(options):
@@ -278,15 +420,18 @@ def test_a_page_that_cannot_be_written_is_told_of(options, monkeypatch):
     assert len(again.rendered) == len(POINTS)  # the second round: the first was kept
 
 
-def test_motion_of_a_sequence_is_rendered_once_and_not_at_all_when_all_is_judged(options):
+@pytest.mark.parametrize("flicker", [0.5, None])
+def test_motion_of_a_sequence_is_rendered_once_and_not_at_all_when_all_is_judged(options, flicker):
+    """Without a flicker, too, where nothing of the reference can be followed."""
     first, again = Stand(), Stand()
+    first.flicker = again.flicker = flicker
     sequence = dataclasses.replace(options, frames=(1, 2, 3))
     make(sequence, POINTS, first)
     assert first.moved == ["room"]
-    assert first.pages[-1].scenes[0].reference_flicker == 0.5
+    assert first.pages[-1].scenes[0].reference_flicker == flicker
     make(sequence, POINTS, again)
     assert again.moved == []
-    assert again.pages[-1].scenes[0].reference_flicker == 0.5
+    assert again.pages[-1].scenes[0].reference_flicker == flicker
 
 
 def test_pictures_are_gone_when_the_report_is_done(options, monkeypatch, tmp_path):

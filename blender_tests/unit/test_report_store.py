@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from addon.report.metrics import Errors
 from addon.report.sweep import Point
 from tooling.console import ToolError
-from tooling.report import store as store_module
+from tooling.report import keys
+from tooling.report.keys import Conditions
 from tooling.report.plan import Task
 from tooling.report.results import Judgement, Reference, Run, Subject
 from tooling.report.store import Measured, Store, WriteError, writing
@@ -22,8 +23,14 @@ from tooling.report.store import Measured, Store, WriteError, writing
 POINT = Point("Cycles", "4 spp", "CYCLES", {"samples": "4"})
 OURS = Point("Samples", "4 spp", "DEEP_GBUFFER", {"samples": "4"})
 MEASURED = Measured(
-    Run(2.5, (0.5, 0.25)), 7.0, ("a texture is missing",), (("layer 2", "nothing reads it"),), "a rasteriser"
+    Run(2.5, (0.5, 0.25)),
+    7.0,
+    "2026-11-22",
+    ("a texture is missing",),
+    (("layer 2", "nothing reads it"),),
+    "a rasteriser",
 )
+CONDITIONS = Conditions("5.2.3 LTS", "one machine", "a rasteriser", 1.0)
 finite = st.floats(allow_nan=False, allow_infinity=False)
 
 
@@ -43,7 +50,7 @@ def make_reference(tmp_path):
 
 @pytest.fixture(name="store")
 def make_store(tmp_path):
-    return Store(tmp_path / "report", "5.2.3 LTS", "one machine")
+    return Store(tmp_path / "report", CONDITIONS)
 
 
 def judgement(store, psnr=30.0, flicker=None):
@@ -65,10 +72,11 @@ def test_what_was_measured_comes_back(store, subject):
 @pytest.mark.parametrize("psnr", [30.5, math.inf])
 @pytest.mark.parametrize("flicker", [None, 0.125])
 def test_what_was_judged_comes_back(store, subject, reference, psnr, flicker):
-    assert store.judgement(subject, POINT, reference) is None
+    name = store.picture_name(subject, POINT, reference, followed=True)
+    assert store.judgement(name) is None
     kept = judgement(store, psnr, flicker)
-    store.keep_judgement(subject, POINT, reference, kept)
-    assert store.judgement(subject, POINT, reference) == kept
+    store.keep_judgement(name, subject, POINT, kept)
+    assert store.judgement(name) == kept
 
 
 @given(cold=finite, warm=st.lists(finite), texts=st.lists(st.text()))
@@ -77,15 +85,15 @@ def test_any_times_and_texts_come_back(tmp_path_factory, cold, warm, texts):
     blend = folder / "room.blend"
     blend.write_bytes(b"")
     task = Task(Subject("room", blend, (1,), (8, 8), None), POINT, 1)
-    measured = Measured(Run(cold, tuple(warm)), 1.0, tuple(texts), tuple((text, text) for text in texts))
-    store = Store(folder, "5.2", "machine")
+    measured = Measured(Run(cold, tuple(warm)), 1.0, "2026-11-22", tuple(texts), tuple((text, text) for text in texts))
+    store = Store(folder, CONDITIONS)
     store.keep_measured(task, measured)
     assert store.measured(task) == measured
 
 
-def test_the_files_are_json_that_any_parser_reads(store, subject, reference):
+def test_the_files_are_json_that_any_parser_reads(store, subject):
     store.keep_measured(Task(subject, POINT, 1), MEASURED)
-    store.keep_judgement(subject, POINT, reference, judgement(store, psnr=math.inf))
+    store.keep_judgement("a name", subject, POINT, judgement(store, psnr=math.inf))
 
     def refuse(word):
         raise AssertionError(word)
@@ -111,8 +119,6 @@ def test_another_state_of_anything_is_measured_again(store, subject, tmp_path):
         ),
     ]
     assert [store.measured(other) for other in others] == [None] * len(others)
-    assert Store(tmp_path / "report", "4.5.1 LTS", "one machine").measured(task) is None
-    assert Store(tmp_path / "report", "5.2.3 LTS", "another machine").measured(task) is None
 
 
 def test_the_same_under_another_name_is_not_measured_again(store, subject, tmp_path):
@@ -123,30 +129,93 @@ def test_the_same_under_another_name_is_not_measured_again(store, subject, tmp_p
     assert store.measured(Task(dataclasses.replace(subject, name="moved", blend=moved), renamed, 1)) == MEASURED
 
 
-def test_another_reference_is_judged_by_again(store, subject, reference, tmp_path):
-    store.keep_judgement(subject, POINT, reference, judgement(store))
+def test_another_reference_is_judged_by_again(subject, reference, tmp_path):
     finer = tmp_path / "finer.exr"
     finer.write_bytes(b"nearer the truth")
-    assert store.judgement(subject, POINT, dataclasses.replace(reference, pictures=(finer,))) is None
+    better = dataclasses.replace(reference, pictures=(finer,))
+    before, after = (CONDITIONS.judgement(subject, POINT, each, followed=True) for each in (reference, better))
+    assert before != after
 
 
-def test_only_ours_depends_on_our_sources(store, subject, monkeypatch):
+@pytest.mark.parametrize(
+    ("changed", "is_judged_again"),
+    [
+        ({"blender": "4.5.1 LTS"}, True),
+        ({"machine": "another machine"}, False),
+        ({"device": "a graphics card"}, True),
+        ({"warm_seconds": 4.0}, False),
+    ],
+)
+def test_under_other_conditions_it_is_measured_again(subject, reference, changed, is_judged_again):
+    others = dataclasses.replace(CONDITIONS, **changed)
     for point in (POINT, OURS):
-        store.keep_measured(Task(subject, point, 1), MEASURED)
-    monkeypatch.setattr(store_module, "rendering_sources", lambda: "other sources")
-    assert store.measured(Task(subject, POINT, 1)) == MEASURED
-    assert store.measured(Task(subject, OURS, 1)) is None
+        assert CONDITIONS.run(Task(subject, point, 1)) != others.run(Task(subject, point, 1))
+        before, after = (each.judgement(subject, point, reference, followed=True) for each in (CONDITIONS, others))
+        assert (before != after) == is_judged_again
+    assert (CONDITIONS.reference(subject, reference) != others.reference(subject, reference)) == is_judged_again
+
+
+@pytest.mark.parametrize(
+    ("names", "measured_again", "judged_again"),
+    [
+        (keys.RENDERING, ["DEEP_GBUFFER"], ["DEEP_GBUFFER"]),
+        (keys.MEASURING, ["CYCLES", "DEEP_GBUFFER"], ["CYCLES", "DEEP_GBUFFER"]),
+        (keys.JUDGING, [], ["CYCLES", "DEEP_GBUFFER"]),
+    ],
+)
+def test_other_sources_are_measured_and_judged_with_again(
+    subject, reference, monkeypatch, names, measured_again, judged_again
+):
+    """Peers depend on what measures and judges, not on our renderer."""
+
+    def found():
+        return [
+            (
+                CONDITIONS.run(Task(subject, point, 1)),
+                CONDITIONS.judgement(subject, point, reference, followed=True),
+                point.engine,
+            )
+            for point in (POINT, OURS)
+        ]
+
+    before, sources = found(), keys.sources
+    monkeypatch.setattr(keys, "sources", lambda asked: "other sources" if asked == names else sources(asked))
+    after = found()
+    pairs = list(zip(before, after, strict=True))
+    assert [old[2] for old, new in pairs if old[0] != new[0]] == measured_again
+    assert [old[2] for old, new in pairs if old[1] != new[1]] == judged_again
+
+
+def test_what_is_judged_without_motion_is_judged_again_with_it(subject, reference):
+    names = {CONDITIONS.judgement(subject, POINT, reference, followed=followed) for followed in (True, False)}
+    assert len(names) == 2
+
+
+def test_every_source_is_there():
+    """A file under another name would never change."""
+    for name in (*keys.RENDERING, *keys.MEASURING, *keys.JUDGING):
+        assert (keys.places.REPOSITORY / name).exists(), name
+    assert "addon/report/sweep.py" not in (*keys.MEASURING, *keys.JUDGING)
+
+
+def test_a_file_that_cannot_be_read_is_named(store, subject, reference):
+    subject.blend.unlink()
+    with pytest.raises(ToolError, match=r"room\.blend could not be read: No such file"):
+        store.check(subject, reference)
 
 
 def test_our_sources_are_what_renders_and_not_what_measures(tmp_path, monkeypatch):
-    monkeypatch.setattr(store_module.places, "REPOSITORY", tmp_path)
+    monkeypatch.setattr(keys.places, "REPOSITORY", tmp_path)
     rendering = ("addon/engine/final.py", "shaders/sky/sky.frag", "addon/ui/properties.py")
     measuring = ("addon/report/sweep.py", "addon/engine/__pycache__/final.pyc", "addon/ui/panels.py")
     for name in (*rendering, *measuring):
         path = tmp_path / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("before", encoding="utf-8")
-    sources = store_module.rendering_sources.__wrapped__
+
+    def sources():
+        return keys.sources.__wrapped__(keys.RENDERING)
+
     before = sources()
     for name in measuring:
         (tmp_path / name).write_text("after", encoding="utf-8")
@@ -157,25 +226,25 @@ def test_our_sources_are_what_renders_and_not_what_measures(tmp_path, monkeypatc
         before = sources()
 
 
-@pytest.mark.parametrize("broken", [b"", b"{", b"[1, 2]", b'{"version": 99}', b'{"version": 1}', b"\xff\xfe", b"null"])
-def test_a_broken_file_is_measured_again_and_told_of(store, subject, reference, capfd, broken):
+@pytest.mark.parametrize("broken", [b"", b"{", b"[1, 2]", b'{"version": 99}', b'{"version": 2}', b"\xff\xfe", b"null"])
+def test_a_broken_file_is_measured_again_and_told_of(store, subject, capfd, broken):
     task = Task(subject, POINT, 1)
     store.keep_measured(task, MEASURED)
-    store.keep_judgement(subject, POINT, reference, judgement(store))
+    store.keep_judgement("a name", subject, POINT, judgement(store))
     for path in store.pictures.parent.rglob("*.json"):
         path.write_bytes(broken)
     assert store.measured(task) is None
-    assert store.judgement(subject, POINT, reference) is None
+    assert store.judgement("a name") is None
     assert capfd.readouterr().err.count("measured again") == 2
     store.keep_measured(task, MEASURED)
     assert store.measured(task) == MEASURED
 
 
-def test_a_judgement_without_its_picture_is_made_again(store, subject, reference, capfd):
+def test_a_judgement_without_its_picture_is_made_again(store, subject, capfd):
     kept = judgement(store)
-    store.keep_judgement(subject, POINT, reference, kept)
+    store.keep_judgement("a name", subject, POINT, kept)
     kept.heat.unlink()
-    assert store.judgement(subject, POINT, reference) is None
+    assert store.judgement("a name") is None
     assert "a_flip.png is gone" in capfd.readouterr().err
 
 

@@ -307,14 +307,16 @@ def test_the_bench_measures_the_scenes_that_are_here_and_fills_the_readme(checko
     assert (checkout / "results" / "report.md").read_text(encoding="utf-8").startswith("# Report\nFOLDER\n")
 
 
-def test_the_bench_fails_where_peers_are_not_as_they_were_and_where_the_report_fails(checkout, monkeypatch):
-    reporting(monkeypatch, 0, {"denoised": 0.2})
+@pytest.mark.parametrize(("code", "changed", "said"), [(0, {"denoised": 0.2}, "had 0.101"), (1, {}, "has failed")])
+def test_the_bench_takes_nothing_where_peers_are_not_as_they_were_or_the_report_fails(
+    checkout, monkeypatch, capsys, code, changed, said
+):
+    readme = (checkout / "README.md").read_text(encoding="utf-8")
+    reporting(monkeypatch, code, changed)
     assert bench.main([]) == 1
-    assert "had 0.101" in (checkout / "results" / "report.md").read_text(encoding="utf-8")
-    (checkout / "results" / "report.md").unlink()
-    reporting(monkeypatch, 1, {})
-    assert bench.main([]) == 1
+    assert said in capsys.readouterr().out
     assert not (checkout / "results" / "report.md").exists()
+    assert (checkout / "README.md").read_text(encoding="utf-8") == readme
 
 
 def test_what_is_committed_names_no_place_on_this_machine(tmp_path, monkeypatch):

@@ -10,9 +10,10 @@ from typing import Any
 
 from addon.report import sweep
 from addon.report.messages import INTERRUPTED
-from tooling.console import ToolError, say, warn
+from tooling.console import ToolError, warn
 from tooling.report.instruments import BlenderInstruments
-from tooling.report.run import Options, make
+from tooling.report.interfaces import Options
+from tooling.report.run import make
 
 WARM_SECONDS = 4.0
 QUICK_WARM_SECONDS = 1.0
@@ -37,9 +38,6 @@ def main(job: dict[str, Any]) -> int:
     warm_seconds = QUICK_WARM_SECONDS if options.quick else WARM_SECONDS
     instruments = BlenderInstruments(Path(job["python"]), warm_seconds, job["reference_samples"])
     problems = make(options, sweep.points(quick=options.quick), instruments)
-    page = options.folder / "index.html"
-    if page.is_file():
-        say(f"wrote {page}")
     if problems:
         warn(f"error: {len(problems)} of what was asked for could not be measured:")
         for problem in problems:

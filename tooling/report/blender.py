@@ -21,7 +21,7 @@ Tell = Callable[[str], None]
 """Shows a text of progress."""
 
 
-class EngineMissingError(ToolError):
+class NoEngineError(ToolError):
     """This Blender has no such engine."""
 
 
@@ -43,7 +43,7 @@ class Rendered:
     """What came of a render. `cold`: seconds of the first, `warm`: of each later one, in its process.
 
     `pictures`: a multi-layer EXR of each frame, by frame. `left_out`: what our engine left out, and why. `files`: what
-    it wrote beside the pictures, in order of the frames. `blender`: version. `device`: what draws, None where untold.
+    it wrote beside the pictures, in order of the frames. `device`: what draws, None where untold.
     """
 
     cold: float
@@ -52,7 +52,6 @@ class Rendered:
     warnings: tuple[str, ...]
     left_out: tuple[tuple[str, str], ...]
     files: tuple[Path, ...]
-    blender: str
     device: str | None = None
 
 
@@ -89,7 +88,7 @@ def render(
     `python`: an environment's with bpy. `frames` and `resolution` None: the file's own. Pictures go into the existing
     `folder`, from where `finished` may take them: it is called for every render at once when it is done.
     Raises ToolError where the process fails or, when the others are done, any render failed: with its reason, and as
-    EngineMissingError where nothing else was wrong with any.
+    NoEngineError where nothing else was wrong with any.
     """
     works = {each.name: _Work(each) for each in renders}
     failures: dict[str, bool] = {}  # reason -> whether it is a missing engine
@@ -115,7 +114,7 @@ def render(
     with tempfile.TemporaryDirectory(prefix="deep_gbuffer_") as scratch:
         _run(python, job, Path(scratch), take, lambda: all(work.is_over for work in works.values()))
     if failures:
-        raise (EngineMissingError if all(failures.values()) else ToolError)("\n".join(failures))
+        raise (NoEngineError if all(failures.values()) else ToolError)("\n".join(failures))
 
 
 @dataclass
@@ -135,7 +134,6 @@ class _Work:
             warnings=tuple(done["warnings"]),
             left_out=tuple((name, reason) for name, reason in done["left_out"]),
             files=tuple(Path(path) for path in done["files"]),
-            blender=done["blender"],
             device=done["device"],
         )
 

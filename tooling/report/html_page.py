@@ -63,7 +63,7 @@ def _header(report: Report) -> str:
         "Machine": report.machine,
         "Blender": report.blender,
         "Deep G-Buffer": f"commit {report.commit}",
-        "Made": report.date,
+        "Made": report.made,
     }
     listed = "".join(f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>" for name, value in facts.items())
     quick = f'<p class="note">{escape(explained.QUICK)}</p>\n' if report.quick else ""

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from addon.report.sweep import OURS, Point
 from tooling.console import ToolError
-from tooling.report import blender, judging, page, references
+from tooling.report import blender, device, judging, page, references
+from tooling.report.interfaces import Rendered, Working
 from tooling.report.plan import Look
 from tooling.report.results import Judgement, Reference, Report, Run, Subject
-from tooling.report.run import Rendered, Working
 
 LAYERS_FILE = "layers.exr"
 """How the names of our layer files end."""
@@ -28,7 +28,7 @@ MOTION = {
 
 @dataclass(frozen=True)
 class BlenderInstruments:
-    """`tooling.report.run.Instruments` with the Blender of `python`.
+    """`tooling.report.interfaces.Instruments` with the Blender of `python`.
 
     `warm_seconds` are spent on warm renders of each process; references are rendered with `reference_samples`.
     """
@@ -36,6 +36,10 @@ class BlenderInstruments:
     python: Path
     warm_seconds: float
     reference_samples: int
+
+    def device(self) -> str:
+        """What our engine draws with."""
+        return device.name()
 
     def look(self, blend: Path, resolution: tuple[int, int] | None) -> Look:
         """Open a file."""
@@ -46,12 +50,10 @@ class BlenderInstruments:
         return references.provide(subject, self.reference_samples, version, working)
 
     def layers(self, subject: Subject, folder: Path, working: Working) -> tuple[Path, ...]:
-        """One sample of every frame by our engine, which says how surfaces move."""
+        """One sample of every frame by our engine, which says how surfaces move in the first view layer."""
         rendered = self._render(subject, blender.Render("motion", OURS, MOTION), folder, working)
         files = tuple(path for path in rendered.files if path.name.endswith(LAYERS_FILE))
-        if len(files) != len(subject.frames):
-            raise ToolError(f"{len(files)} of {len(subject.frames)} frames have motion vectors.")
-        return files
+        return one_of_each(files, len(subject.frames))
 
     def render(self, subject: Subject, point: Point, folder: Path, working: Working) -> Rendered:
         """Render and time a point."""
@@ -91,15 +93,23 @@ class BlenderInstruments:
         except ValueError as error:
             raise ToolError(f"{error}.") from error
 
-    def reference_flicker(
-        self, reference: Reference, subject: Subject, layers: Sequence[Path], folder: Path
-    ) -> float | None:
+    def reference_flicker(self, reference: Reference, subject: Subject, layers: Sequence[Path]) -> float | None:
         """Flicker of the reference's own frames."""
         try:
-            return judging.judge_reference(reference, subject, layers, folder, f"{subject.name}_reference")[0]
+            return judging.reference_flicker(reference, subject, layers)
         except ValueError as error:
             raise ToolError(f"{error}.") from error
 
     def write(self, report: Report, folder: Path) -> None:
         """Write the page."""
         page.write(report, folder)
+
+
+def one_of_each(files: Sequence[Path], frames: int) -> tuple[Path, ...]:
+    """The first of each frame's layer files; they are in order of the frames, as many of each as it has view layers.
+
+    Raises ToolError where a frame has none, or not as many as the others.
+    """
+    if not files or len(files) % frames:
+        raise ToolError(f"{frames} frames have {len(files)} files with motion vectors.")
+    return tuple(files[:: len(files) // frames])

@@ -65,17 +65,10 @@ def judge(
     )
 
 
-def judge_reference(
-    reference: Reference, subject: Subject, layers: Sequence[Path] | None, folder: Path, name: str = "reference"
-) -> tuple[float | None, Path]:
-    """The reference's own flicker, as in `judge`, and `folder`/NAME.png with its first frame's judged rectangle.
-
-    Raises OSError and ValueError as `judge`.
-    """
-    path = folder / f"{name}.png"
+def reference_flicker(reference: Reference, subject: Subject, layers: Sequence[Path]) -> float | None:
+    """The reference's own flicker, as in `judge`. Raises OSError and ValueError as that."""
     seen = [display(centre(combined(picture), subject.crop)) for picture in reference.pictures]
-    write_png(path, seen[0])
-    return _flicker(seen, layers, subject.crop), path
+    return _flicker(seen, layers, subject.crop)
 
 
 def _flicker(seen: Sequence[Float32Array], layers: Sequence[Path] | None, crop: Crop | None) -> float | None:

@@ -17,7 +17,7 @@ def document(report: Report, pictures: Sequence[Sequence[str]]) -> str:
         f"# {explained.TITLE}\n\n{explained.INTRODUCTION}\n\n",
         f"{explained.QUICK}\n\n" if report.quick else "",
         f"Machine: {markdown_text(report.machine)}. Blender {markdown_text(report.blender)}, Deep G-Buffer at commit "
-        f"{markdown_text(report.commit)}, {markdown_text(report.date)}.\n\n",
+        f"{markdown_text(report.commit)}, {markdown_text(report.made)}.\n\n",
         f"```\n{report.command}\n```\n\n{_problems(report.problems)}",
         f"{explained.PEERS} {explained.FRONT}\n\n",
         "".join(

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Everything that people read of a report, as files."""
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from tooling import places
 from tooling.report import crops, html_page, markdown_page, panels, plots, tables
 from tooling.report.html_page import Media, Shot
 from tooling.report.results import Report, SceneReport
@@ -93,10 +93,5 @@ def _shots(views: crops.Views | None, quality: int) -> tuple[Shot, ...]:
 
 def _put(path: Path, content: bytes) -> None:
     """Write a file so that it is never half there; makes the folder."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    draft = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
+    with places.replacing(path) as draft:
         draft.write_bytes(content)
-        draft.replace(path)
-    finally:
-        draft.unlink(missing_ok=True)

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Parts and sizes of pictures, NVIDIA's FLIP between them, and files for people. (H, W, 3) float32, top row first."""
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -9,6 +8,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from addon.scene.arrays import Float32Array
+from tooling import places
 
 CAPTION = 22
 """Height in pixels of the line above each picture."""
@@ -52,13 +52,8 @@ def flip(reference: Float32Array, other: Float32Array) -> tuple[Float32Array, fl
 
 def write_png(path: Path, shown: Float32Array) -> None:
     """Write an sRGB picture 0…1 as PNG of 8 bits, under another name first; makes the folder. Raises OSError."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    draft = path.with_name(f".{os.getpid()}_{path.name}")
-    try:
+    with places.replacing(path) as draft:
         _bytes(shown).save(draft, optimize=True)
-        draft.replace(path)
-    finally:
-        draft.unlink(missing_ok=True)
 
 
 def write_sheet(path: Path, rows: Sequence[Sequence[tuple[str, Float32Array]]], quality: int = 88) -> None:

@@ -52,14 +52,6 @@ def names(blends: Sequence[Path]) -> list[str]:
     return found
 
 
-def different(points: Iterable[Point]) -> list[Point]:
-    """The points without those that render the same as one before them."""
-    found: dict[object, Point] = {}
-    for point in points:
-        found.setdefault(point.identity, point)
-    return list(found.values())
-
-
 def rounds(subjects: Sequence[Subject], points: Sequence[Point], number_of_rounds: int) -> list[list[Task]]:
     """Every process of the report: a round of all points of all scenes, then the next round, so that a machine that is
     busy for a while disturbs one round of many points rather than all rounds of a few.

@@ -132,7 +132,7 @@ def _given(subject: Subject, version: str, report_progress: blender.Tell) -> Ref
     source = f"{GIVEN} beside {subject.blend.name}"
     try:
         parts = Parts(subject, subject.frames[0], CHECK_SAMPLES, version).provide(2, report_progress)
-    except blender.EngineMissingError:
+    except blender.NoEngineError:
         return Reference(source, None, math.nan, math.nan, (path,))
     first, second = (centre(combined(each), subject.crop) for each in parts)
     noise = noise_of(centre(combined(path), subject.crop), first, second)

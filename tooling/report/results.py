@@ -78,18 +78,17 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Measurement:
-    """A point of a scene, measured. `left_out`: what our engine left out, and why; empty for peers."""
+    """A point of a scene, measured. `left_out`: what our engine left out, and why; empty for peers.
+
+    `days`: when its runs were made, as ISO 8601 dates.
+    """
 
     point: Point
     runs: tuple[Run, ...]
     judgement: Judgement
     warnings: tuple[str, ...] = ()
     left_out: tuple[tuple[str, str], ...] = ()
-
-    @property
-    def cold(self) -> "Spread":
-        """Seconds of cold renders."""
-        return Spread.of([run.cold for run in self.runs])
+    days: tuple[str, ...] = ()
 
     @property
     def warm(self) -> "Spread":
@@ -140,3 +139,12 @@ class Report:
     date: str
     quick: bool
     problems: tuple[str, ...] = field(default=())
+
+    @property
+    def made(self) -> str:
+        """When it was made, and when that was measured where it was on other days."""
+        days = {day for scene in self.scenes for each in scene.measurements for day in each.days}
+        if days <= {self.date}:
+            return self.date
+        first, last = min(days), max(days)
+        return f"{self.date}, measured {f'on {first}' if first == last else f'from {first} to {last}'}"

@@ -1,106 +1,37 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes a report: measures what is not in the store yet, and writes the page from what is there."""
 
+import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import date
 from pathlib import Path
-from tempfile import TemporaryDirectory, mkdtemp
-from typing import Protocol
 
 from addon.report.sweep import Point
 from tooling.console import ToolError, warn
 from tooling.machine import commit, machine
 from tooling.report import plan
-from tooling.report.blender import EngineMissingError
-from tooling.report.plan import Look, Task
+from tooling.report.blender import NoEngineError
+from tooling.report.interfaces import Instruments, Options
+from tooling.report.keys import Conditions
+from tooling.report.plan import Task
 from tooling.report.progress import Lines, called
-from tooling.report.results import Crop, Judgement, Measurement, Reference, Report, Run, SceneReport, Subject
-from tooling.report.store import Measured, Store, WriteError, writing
-
-Working = Callable[[str], None]
-"""Takes what Blender says of how far it is."""
-
-
-@dataclass(frozen=True)
-class Options:
-    """What the command line asked for.
-
-    `scenes`: files, each with the rectangle that is judged (None: all of it). `resolution` (width, height) and `frames`
-    None: each file's own. `command` makes the report again.
-    """
-
-    scenes: tuple[tuple[Path, Crop | None], ...]
-    folder: Path
-    quick: bool
-    resolution: tuple[int, int] | None
-    frames: tuple[int, ...] | None
-    rounds: int
-    command: str
-
-
-@dataclass(frozen=True)
-class Rendered:
-    """What a process that rendered a point gave: its times, what it said, and one EXR picture per frame."""
-
-    run: Run
-    warnings: tuple[str, ...]
-    left_out: tuple[tuple[str, str], ...]
-    device: str | None
-    pictures: tuple[Path, ...]
-
-
-class Instruments(Protocol):
-    """What does the work. All raise ToolError with the reason, as a sentence, where something cannot be done."""
-
-    def look(self, blend: Path, resolution: tuple[int, int] | None) -> Look:
-        """Open a file. `resolution` None: the file's."""
-        ...
-
-    def reference(self, subject: Subject, version: str, working: Working) -> Reference:
-        """What pictures of the scene are judged by; `version` is Blender's."""
-        ...
-
-    def layers(self, subject: Subject, folder: Path, working: Working) -> tuple[Path, ...]:
-        """A layer file with depth and motion per frame of a sequence, in `folder`."""
-        ...
-
-    def render(self, subject: Subject, point: Point, folder: Path, working: Working) -> Rendered:
-        """Render a point in a process of its own, pictures in `folder`. Raises EngineMissingError too."""
-        ...
-
-    def judge(
-        self,
-        pictures: Sequence[Path],
-        reference: Reference,
-        subject: Subject,
-        layers: Sequence[Path] | None,
-        folder: Path,
-        name: str,
-    ) -> Judgement:
-        """Compare pictures with the reference; PNG files go to `folder`. Raises OSError where that fails."""
-        ...
-
-    def reference_flicker(
-        self, reference: Reference, subject: Subject, layers: Sequence[Path], folder: Path
-    ) -> float | None:
-        """Flicker of the reference's own frames. Raises OSError as `judge`."""
-        ...
-
-    def write(self, report: Report, folder: Path) -> None:
-        """Write the page and everything that belongs to it. Raises OSError where it cannot be written."""
-        ...
+from tooling.report.results import Crop, Judgement, Measurement, Reference, Report, SceneReport, Subject
+from tooling.report.store import GO_ON, Measured, Store, WriteError, writing
 
 
 @dataclass
 class Scene:
-    """A scene at work. `layers`: of a sequence with something left to be judged. `hopeless`: points that failed."""
+    """A scene at work. `layers`: of a sequence with something left to be judged. `is_followed`: False for a sequence
+    without motion. `hopeless`: points that failed.
+    """
 
     subject: Subject
     reference: Reference
     layers: tuple[Path, ...] | None = None
+    is_followed: bool = True
     problems: list[str] = field(default_factory=list[str])
     hopeless: list[Point] = field(default_factory=list[Point])
 
@@ -109,18 +40,22 @@ def make(options: Options, points: Sequence[Point], instruments: Instruments) ->
     """Measure all points of all scenes and write the page; sentences about what could not be measured.
 
     Raises ToolError where files cannot be written. Then, and where it is interrupted, the page is written of what is
-    there.
+    there, but not before every scene was looked at: it would lack those of the page before.
     """
-    with TemporaryDirectory(prefix="deep_gbuffer_report_") as scratch:
-        work = Work(options, plan.different(points), instruments, Path(scratch))
-        try:
+    try:
+        with tempfile.TemporaryDirectory(prefix="deep_gbuffer_report_") as scratch:
+            work = Work(options, points, instruments, Path(scratch))
             work.prepare()
-            work.measure()
-        except BaseException:
-            with suppress(ToolError):
-                work.write()
-            raise
-        work.write()
+            try:
+                work.measure()
+            except BaseException:
+                with suppress(ToolError, OSError):
+                    work.finish()
+                raise
+            work.finish()
+    except OSError as error:
+        place = error.filename or tempfile.tempdir  # the system does not always name what it refused
+        raise ToolError(f"{f'{place}: ' if place else ''}{error.strerror or error}. {GO_ON}") from error
     return work.problems
 
 
@@ -134,8 +69,8 @@ class Work:
         self._instruments = instruments
         self._scratch = scratch
         self._scenes: dict[str, Scene] = {}
-        self._store = Store(options.folder, "", "")
-        self._blender = ""
+        self._conditions = Conditions("", machine(), "", instruments.warm_seconds)
+        self._store = Store(options.folder, self._conditions)
         self._general: list[str] = []
         self._missing: set[str] = set()
         self._lines = Lines(0, 1)
@@ -163,33 +98,43 @@ class Work:
         """A scene with what its points are judged by. Raises ToolError with the reason where there is none."""
         self._lines.prepare(f"opening {blend.name}")
         look = self._instruments.look(blend, self._options.resolution)
-        if not self._blender:
-            self._blender = look.blender
-            self._store = Store(self._options.folder, look.blender, machine())
+        if not self._conditions.blender:
+            device = self._instruments.device()
+            self._conditions = replace(self._conditions, blender=look.blender, device=device)
+            self._store = Store(self._options.folder, self._conditions)
         subject = plan.subject(name, blend, crop, self._options.frames, look)
         self._lines.prepare(name)
         reference = self._instruments.reference(subject, look.blender, self._lines.working)
         self._lines.reference(subject, reference)
+        self._store.check(subject, reference)
         scene = Scene(subject, reference)
         if len(subject.frames) > 1 and not self._is_judged(scene):
-            self._lines.prepare(f"{name}: motion")
-            scene.layers = self._instruments.layers(subject, Path(mkdtemp(dir=self._scratch)), self._lines.working)
-            self._judge_reference(scene, scene.layers)
+            self._follow(scene)
         return scene
 
     def _is_judged(self, scene: Scene) -> bool:
         """Whether nothing of a sequence needs its motion any more."""
         subject, reference = scene.subject, scene.reference
         return self._store.is_reference_judged(subject, reference) and all(
-            self._store.judgement(subject, point, reference) for point in self._points
+            self._judgement(scene, point) for point in self._points
         )
 
-    def _judge_reference(self, scene: Scene, layers: Sequence[Path]) -> None:
-        """Measure the reference's own flicker."""
-        folder = self._store.pictures
-        with writing(folder):
-            flicker = self._instruments.reference_flicker(scene.reference, scene.subject, layers, folder)
-        self._store.keep_reference_flicker(scene.subject, scene.reference, flicker)
+    def _follow(self, scene: Scene) -> None:
+        """Get a sequence's motion, and the reference's own flicker. Without, the sequence is judged but for flicker."""
+        subject, folder = scene.subject, Path(tempfile.mkdtemp(dir=self._scratch))
+        self._lines.prepare(f"{subject.name}: motion")
+        try:
+            layers = self._instruments.layers(subject, folder, self._lines.working)
+            with writing(folder):
+                flicker = self._instruments.reference_flicker(scene.reference, subject, layers)
+        except WriteError:
+            raise
+        except ToolError as error:
+            scene.is_followed = False
+            self._problem(scene.problems, f"The flicker of {subject.name} is left out: {error}")
+        else:
+            self._store.keep_reference_flicker(subject, scene.reference, flicker)
+            scene.layers = layers
 
     def measure(self) -> None:
         """Run every process that is not in the store yet, and write the page after each round.
@@ -219,26 +164,30 @@ class Work:
         if measured is None:
             return False
         self._durations.add(task, measured.process_seconds)
-        return task.round > 1 or self._judgement(task.subject, task.point) is not None
+        return task.round > 1 or self._judgement(self._scenes[task.subject.name], task.point) is not None
 
     def _is_hopeless(self, task: Task) -> bool:
         """Whether this point or its engine has failed before."""
         return task.point.engine in self._missing or task.point in self._scenes[task.subject.name].hopeless
 
-    def _judgement(self, subject: Subject, point: Point) -> Judgement | None:
+    def _judgement(self, scene: Scene, point: Point) -> Judgement | None:
         """What the store knows of the point's pictures."""
-        return self._store.judgement(subject, point, self._scenes[subject.name].reference)
+        return self._store.judgement(self._picture_name(scene, point))
+
+    def _picture_name(self, scene: Scene, point: Point) -> str:
+        """What the store calls the point's pictures."""
+        return self._store.picture_name(scene.subject, point, scene.reference, followed=scene.is_followed)
 
     def _measure(self, task: Task) -> None:
         """Run one process, judge its pictures unless that was done in a round before, and keep what it gave."""
         scene, point = self._scenes[task.subject.name], task.point
         started = time.monotonic()
         try:
-            with TemporaryDirectory(dir=self._scratch) as folder:
+            with tempfile.TemporaryDirectory(dir=self._scratch) as folder:
                 rendered = self._instruments.render(scene.subject, point, Path(folder), self._lines.working)
                 took = time.monotonic() - started
-                judgement = self._judgement(scene.subject, point) or self._judge(scene, point, rendered.pictures)
-        except EngineMissingError as error:
+                judgement = self._judgement(scene, point) or self._judge(scene, point, rendered.pictures)
+        except NoEngineError as error:
             self._missing.add(point.engine)
             self._problem(self._general, f"Everything that {point.engine} renders is left out: {error}")
         except WriteError:
@@ -247,18 +196,19 @@ class Work:
             scene.hopeless.append(point)
             self._problem(scene.problems, f"{called(scene.subject, point)} is left out: {error}")
         else:
-            measured = Measured(rendered.run, took, rendered.warnings, rendered.left_out, rendered.device)
+            said = rendered.warnings, rendered.left_out, rendered.device
+            measured = Measured(rendered.run, took, date.today().isoformat(), *said)
             self._store.keep_measured(task, measured)
             self._durations.add(task, took)
             self._lines.measured(task, measured, judgement)
 
     def _judge(self, scene: Scene, point: Point, pictures: Sequence[Path]) -> Judgement:
         """Judge a point's pictures and keep that."""
-        name = self._store.picture_name(scene.subject, point, scene.reference)
+        name = self._picture_name(scene, point)
         folder = self._store.pictures
         with writing(folder):
             judgement = self._instruments.judge(pictures, scene.reference, scene.subject, scene.layers, folder, name)
-        self._store.keep_judgement(scene.subject, point, scene.reference, judgement)
+        self._store.keep_judgement(name, scene.subject, point, judgement)
         return judgement
 
     def _problem(self, problems: list[str], sentence: str) -> None:
@@ -268,13 +218,16 @@ class Work:
         warn(f"problem: {sentence}")
 
     def write(self) -> None:
-        """Write the page of what is there, if there is anything. Raises WriteError where it cannot be written."""
-        report = self.report()
-        if any(scene.measurements for scene in report.scenes):
-            self._lines.prepare("writing the page")
-            with writing(self._options.folder):
-                self._instruments.write(report, self._options.folder)
-            self._lines.clear()
+        """Write the page of what is there. Raises WriteError where it cannot be written."""
+        self._lines.prepare("writing the page")
+        with writing(self._options.folder):
+            self._instruments.write(self.report(), self._options.folder)
+        self._lines.clear()
+
+    def finish(self) -> None:
+        """Write the page for the last time, and say where it is. Raises WriteError where it cannot be written."""
+        self.write()
+        self._lines.say(f"wrote {self._options.folder / 'index.html'}")
 
     def report(self) -> Report:
         """Everything that is known now."""
@@ -282,7 +235,7 @@ class Work:
             scenes=tuple(self._scene_report(scene) for scene in self._scenes.values()),
             command=self._options.command,
             machine=self._machine(),
-            blender=self._blender,
+            blender=self._conditions.blender or "unknown",
             commit=commit(),
             date=date.today().isoformat(),
             quick=self._options.quick,
@@ -293,7 +246,7 @@ class Work:
         """The machine in words, with what draws there where that was told."""
         tasks = (Task(scene.subject, point, 1) for scene in self._scenes.values() for point in self._points)
         found = (measured.device for task in tasks if (measured := self._store.measured(task)) and measured.device)
-        return "; ".join(filter(None, (machine(), next(found, None))))
+        return "; ".join(filter(None, (self._conditions.machine, next(found, None))))
 
     def _scene_report(self, scene: Scene) -> SceneReport:
         """What is known of a scene now: its points that were rendered and judged."""
@@ -309,8 +262,9 @@ class Work:
         """A point's rounds and judgement; None where there are none yet."""
         tasks = (Task(scene.subject, point, number) for number in range(1, self._options.rounds + 1))
         found = [measured for task in tasks if (measured := self._store.measured(task))]
-        judgement = self._judgement(scene.subject, point)
+        judgement = self._judgement(scene, point)
         if not found or judgement is None:
             return None
         runs = tuple(measured.run for measured in found)
-        return Measurement(point, runs, judgement, found[0].warnings, found[0].left_out)
+        days = tuple(measured.day for measured in found)
+        return Measurement(point, runs, judgement, found[0].warnings, found[0].left_out, days)
