@@ -12,7 +12,7 @@ import sys
 from types import FrameType
 
 MINIMUM_PYTHON = (3, 9)
-TEST_KINDS = ("unit", "gl", "blender", "gui", "stability")
+TEST_KINDS = ("unit", "gl", "blender", "gui", "stability", "report")
 
 
 def resolution(text: str) -> tuple[int, int]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`build.py test` and `bench`: pytest and the benches inside the Blender environments."""
+"""`build.py test` and `bench`: pytest inside the Blender environments, what needs no Blender in the development one."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import os
 import subprocess
 import tempfile
 from argparse import Namespace
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from tooling import blender_window, environments, places
@@ -48,16 +49,19 @@ def test(options: Namespace) -> int:
     kinds = options.only or options.kinds
     outcomes: dict[str, Outcome] = {}
     missing: list[str] = []
-    inside = [kind for kind in kinds if kind != "gui" and has_tests(places.TESTS / kind)]
+    inside = [kind for kind in kinds if kind not in {"gui", "report"} and has_tests(places.TESTS / kind)]
     if inside:
         for version in versions(options.blender, missing):
-            outcomes[f"Blender {version}"] = run_in(version, f"Blender {version}", inside, options.arguments)
+            python = partial(environments.blender_python, version)
+            outcomes[f"Blender {version}"] = run_in(python, f"Blender {version}", inside, options.arguments)
+    if "report" in kinds and has_tests(places.TESTS / "report"):
+        outcomes["report"] = run_in(environments.development_python, "report", ["report"], options.arguments)
     if "gui" in kinds and has_tests(places.TESTS / "gui"):
         reason = no_window()
         if reason:
             missing.append(f"The window tests did not run: {reason}")
         else:
-            outcomes["window"] = run_in(None, "window", ["gui"], options.arguments)
+            outcomes["window"] = run_in(environments.blender_python, "window", ["gui"], options.arguments)
     for line in missing:
         warn(f"NOT TESTED: {line}")
     failed = [name for name, outcome in outcomes.items() if outcome.code not in {0, NO_TESTS}]
@@ -83,10 +87,10 @@ def no_window() -> str:
         return f"making it failed. {error}"
 
 
-def run_in(version: str | None, label: str, kinds: Iterable[str], arguments: list[str]) -> Outcome:
-    """Run the tests in Blender `version` (None: the newest); one that cannot be set up counts as a failure."""
+def run_in(provide: Callable[[], Path], label: str, kinds: Iterable[str], arguments: list[str]) -> Outcome:
+    """Run the tests in the interpreter that `provide` sets up; one that cannot be set up counts as a failure."""
     try:
-        python = environments.blender_python(version)
+        python = provide()
     except ToolError as error:
         warn(f"error: {error}")
         return Outcome(1, failed=1)

@@ -31,6 +31,7 @@ def tests_in(tmp_path, monkeypatch):
     monkeypatch.setattr(places, "TESTS", tmp_path)
     monkeypatch.setattr(places, "REPOSITORY", tmp_path)
     monkeypatch.setattr(environments, "blender_python", lambda _version=None: sys.executable)
+    monkeypatch.setattr(environments, "development_python", lambda: sys.executable)
     monkeypatch.setattr(blender_window, "provide", lambda: None)
     monkeypatch.setattr(blender_window, "why_not", lambda: "no window here.")
 
@@ -44,7 +45,7 @@ def tests_in(tmp_path, monkeypatch):
 
 def run():
     """The verb, in one Blender version; its exit code."""
-    return testing.test(Namespace(only=None, kinds=("unit", "gui"), blender="5.2", arguments=[]))
+    return testing.test(Namespace(only=None, kinds=("unit", "gui", "report"), blender="5.2", arguments=[]))
 
 
 def last_line(capfd):
@@ -54,9 +55,9 @@ def last_line(capfd):
 
 
 def test_passing_tests_are_counted(tests_in, capfd):
-    tests_in(unit=PASSING)
+    tests_in(unit=PASSING, report=PASSING)
     assert run() == 0
-    assert last_line(capfd) == ("1 passed, 0 failed, 0 skipped", "")
+    assert last_line(capfd) == ("2 passed, 0 failed, 0 skipped", "")
 
 
 def test_failures_and_errors_count_as_failed(tests_in, capfd):

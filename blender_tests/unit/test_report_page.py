@@ -297,16 +297,3 @@ def test_the_page_stays_below_its_limit_by_coarser_pictures(drawn, tmp_path, mon
     monkeypatch.setattr(page, "PAGE_BYTES", fine - 200)
     page.write(report(drawn), tmp_path / "coarse")
     assert (tmp_path / "coarse" / "index.html").stat().st_size < fine - 200
-
-
-def test_plots_of_any_report_can_be_drawn():
-    pytest.importorskip("matplotlib")
-    perfect = measurement(flip=0.0, digest="perfect", errors=errors(relative_mse=0.0, rmse=0.0))
-    for measurements in ([perfect], [measurement(warm=())], [*swept(quick=False), perfect]):
-        shown = [panels.panel(scene(measurements), metric) for metric in (panels.FLIP, panels.RELATIVE_MSE)]
-        data = plots.png(shown, EVIL)
-        assert data.startswith(b"\x89PNG")
-        assert len(data) < 120_000
-        svg = plots.svg(shown[0])
-        assert "<text" in svg
-        assert svg.count("<svg") == 1
