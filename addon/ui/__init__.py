@@ -6,7 +6,17 @@ from pathlib import Path
 
 import bpy
 
-from . import compare, compare_panels, comparing, data_panels, operators, panels, properties, standard_panels
+from . import (
+    compare,
+    compare_panels,
+    compared_images,
+    comparing,
+    data_panels,
+    operators,
+    panels,
+    properties,
+    standard_panels,
+)
 
 _CLASSES = (
     *operators.CLASSES,
@@ -24,6 +34,27 @@ def _before_load(_path: str) -> None:
     comparing.clear()
 
 
+@bpy.app.handlers.persistent
+def _before_undo(*_arguments: object) -> None:
+    """Undo and redo know nothing of a comparison's images."""
+    compared_images.before_undo()
+
+
+@bpy.app.handlers.persistent
+def _after_undo(*_arguments: object) -> None:
+    """Bring them back."""
+    compared_images.after_undo()
+
+
+_HANDLERS = (
+    (bpy.app.handlers.load_pre, _before_load),
+    (bpy.app.handlers.undo_pre, _before_undo),
+    (bpy.app.handlers.undo_post, _after_undo),
+    (bpy.app.handlers.redo_pre, _before_undo),
+    (bpy.app.handlers.redo_post, _after_undo),
+)
+
+
 def register() -> None:
     """Add everything to Blender's user interface."""
     properties.register()
@@ -31,14 +62,16 @@ def register() -> None:
         bpy.utils.register_class(cls)
     bpy.utils.register_preset_path(_PRESET_ROOT)
     standard_panels.register()
-    bpy.app.handlers.load_pre.append(_before_load)
+    for handlers, handler in _HANDLERS:
+        handlers.append(handler)
     atexit.register(unregister)  # bpy 4.5 as a module does not end cleanly while Python classes are registered
 
 
 def unregister() -> None:
     """Take everything away again."""
     atexit.unregister(unregister)
-    bpy.app.handlers.load_pre.remove(_before_load)
+    for handlers, handler in _HANDLERS:
+        handlers.remove(handler)
     comparing.clear()
     standard_panels.unregister()
     bpy.utils.unregister_preset_path(_PRESET_ROOT)

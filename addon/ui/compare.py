@@ -10,7 +10,7 @@ import bpy
 
 from ..engine import statistics
 from ..report.comparison import ComparisonError
-from . import comparing, image_editors
+from . import compared_images, comparing, image_editors
 
 TICK_SECONDS = 0.1
 LINE_SECONDS = 1.0
@@ -18,11 +18,14 @@ LINE_SECONDS = 1.0
 
 
 class DEEP_GBUFFER_OT_compare_with_cycles(bpy.types.Operator):
-    """Render the current frame with this engine and with Cycles, in a Blender of its own, and show how far the
-    pictures are apart. The scene, its settings and the last render stay as they are"""
+    """Compare our picture of a scene with Cycles'."""
 
     bl_idname = "deep_gbuffer.compare_with_cycles"
     bl_label = "Compare with Cycles"
+    bl_description = (
+        "Render the current frame with this engine and with Cycles, in a Blender of its own, and show how far the "
+        "pictures are apart. The scene, its settings and the last render stay as they are"
+    )
     bl_options = {"REGISTER"}  # noqa: RUF012 - Blender's own attribute; keeps the last values
 
     samples: bpy.props.IntProperty(
@@ -74,8 +77,7 @@ class DEEP_GBUFFER_OT_compare_with_cycles(bpy.types.Operator):
             if bpy.app.background:
                 _run_to_the_end()
             else:
-                operators: Any = bpy.ops
-                operators.deep_gbuffer.follow_comparison("INVOKE_DEFAULT")
+                _follow(context)
         except ComparisonError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -102,20 +104,23 @@ class DEEP_GBUFFER_OT_follow_comparison(bpy.types.Operator):
             comparing.cancel()
         elif event.type != "TIMER":
             return {"PASS_THROUGH"}
+        goes_on = False
         try:
             if comparing.running() is not self._comparison:  # cancelled elsewhere, maybe followed by another
                 raise comparing.CancelledError
-            if comparing.step():
+            goes_on = comparing.step()
+            if goes_on:
                 _show_progress(context.window_manager)
-                return {"PASS_THROUGH"}
-            if not image_editors.show(bpy.data.images[comparing.DIFFERENCE], context):
-                self.report({"INFO"}, f"The image “{comparing.DIFFERENCE}” shows how far the pictures are apart.")
+            elif not image_editors.show(bpy.data.images[compared_images.DIFFERENCE], context):
+                self.report({"INFO"}, f"The image “{compared_images.DIFFERENCE}” shows how far the pictures are apart.")
         except comparing.CancelledError as cancelled:
             self.report({"INFO"}, str(cancelled))
-        except ComparisonError as error:
+        except RuntimeError as error:  # ComparisonError, or Blender's own where it cannot show the image
             self.report({"ERROR"}, str(error))
-        self._end(context)
-        return {"FINISHED"}
+        finally:
+            if not goes_on:
+                self._end(context)
+        return {"PASS_THROUGH"} if goes_on else {"FINISHED"}
 
     def cancel(self, context: Any) -> None:
         """Its window closes, another file is loaded, or Blender ends."""
@@ -165,11 +170,25 @@ class DEEP_GBUFFER_OT_show_compared(bpy.types.Operator):
         if found is None:
             self.report({"ERROR"}, f"There is no image “{self.image}” any more: compare again.")
             return {"CANCELLED"}
-        space = context.space_data
-        zoom = space.zoom_percentage
-        space.image = found  # shows it at 100 %
-        space.zoom_percentage = zoom
+        compared_images.switch(context.space_data, found)
         return {"FINISHED"}
+
+
+def _follow(context: Any) -> None:
+    """Let an operator follow the comparison in a window, any one where the context, a timer's say, has none.
+
+    Raises ComparisonError where there is none that it can run in; the comparison is cancelled then.
+    """
+    window = context.window or next(iter(context.window_manager.windows), None)
+    operators: Any = bpy.ops
+    try:
+        if window is None:
+            raise ComparisonError("There is no window that could show a comparison.")
+        with context.temp_override(window=window):
+            operators.deep_gbuffer.follow_comparison("INVOKE_DEFAULT")
+    except RuntimeError as error:
+        comparing.cancel()
+        raise ComparisonError(str(error)) from error
 
 
 def _run_to_the_end() -> None:

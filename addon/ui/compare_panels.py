@@ -6,7 +6,7 @@ from typing import Any
 import bpy
 
 from ..report.compared import Numbers
-from . import comparing
+from . import compared_images, comparing
 from .compare import (
     DEEP_GBUFFER_OT_cancel_comparison,
     DEEP_GBUFFER_OT_compare_with_cycles,
@@ -46,13 +46,13 @@ class DEEP_GBUFFER_PT_compared(bpy.types.Panel):
     def poll(cls, context: Any) -> bool:
         """Where a picture of the last comparison is shown."""
         image = context.space_data.image
-        return image is not None and image.name in comparing.IMAGES.values() and comparing.numbers() is not None
+        return image is not None and image.name in compared_images.IMAGES.values() and comparing.numbers() is not None
 
     def draw(self, context: Any) -> None:
         """The three pictures to choose from, and the numbers."""
         shown = context.space_data.image.name
         column = self.layout.column(align=True)
-        for name in comparing.IMAGES.values():
+        for name in compared_images.IMAGES.values():
             title = name.removeprefix("Comparison: ")
             button = column.operator(DEEP_GBUFFER_OT_show_compared.bl_idname, text=title, depress=name == shown)
             button.image = name
@@ -79,9 +79,14 @@ def tables(numbers: Numbers) -> list[tuple[str, list[tuple[str, str]]]]:
             "Renders",
             [
                 ("Size", f"{width} × {height}"),
+                ("Cycles samples", f"{numbers.samples:,}"),
+            ],
+        ),
+        (
+            "Time of a first render",
+            [
                 ("Deep G-Buffer", f"{numbers.our_seconds:.2f} s"),
                 ("Cycles", f"{numbers.cycles_seconds:.2f} s"),
-                ("Cycles samples", f"{numbers.samples:,}"),
             ],
         ),
         (
@@ -90,7 +95,7 @@ def tables(numbers: Numbers) -> list[tuple[str, list[tuple[str, str]]]]:
                 ("RMSE", f"{errors.rmse:.5f}"),
                 ("Noise of Cycles", f"{numbers.noise_rmse:.5f}"),
                 ("Relative MSE", f"{errors.relative_mse:.5f}"),
-                ("PSNR", psnr),
+                ("PSNR, Standard", psnr),
                 *bias,
                 ("Fireflies", f"{errors.fireflies:.4f}"),
                 ("Invalid pixels", f"{errors.invalid:,}"),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The one comparison with Cycles that runs, and what the last one found: its pictures as images, its numbers."""
+"""The one comparison with Cycles that runs, and the numbers that the last one found."""
 
 import shutil
 import sys
@@ -11,13 +11,9 @@ from typing import Any
 import bpy
 
 from ..engine import messages
-from ..output import write_channels
-from ..report.compared import Compared, Numbers, compare
+from ..report.compared import Numbers, compare
 from ..report.comparison import Comparison, ComparisonError, Request
-
-DIFFERENCE = "Comparison: Difference"
-IMAGES = {"ours": "Comparison: Deep G-Buffer", "cycles": "Comparison: Cycles", "difference": DIFFERENCE}
-"""Names of the images, by the attribute of `Compared` that each shows."""
+from . import compared_images
 
 LEAST_PIXELS = 4
 """Blender's least width and height of a picture."""
@@ -34,11 +30,10 @@ class CancelledError(ComparisonError):
 
 @dataclass
 class _State:
-    """`running`: what runs now. `numbers` and `folder`: of the last one, `folder` holds the files behind its images."""
+    """`running`: what runs now. `numbers`: of the last one."""
 
     running: Comparison | None = None
     numbers: Numbers | None = None
-    folder: Path | None = None
 
 
 _state = _State()
@@ -88,10 +83,18 @@ def step() -> bool:
     try:
         if _state.running.poll():
             return True
-        _keep(compare(_state.running.result(), _state.running.request.samples))
-    except (ComparisonError, OSError, ValueError, MemoryError) as error:
+        found = compare(_state.running.result(), _state.running.request.samples)
+        compared_images.make(found, _new_folder())
+        _state.numbers = found.numbers
+    except ComparisonError:
         cancel()
-        raise ComparisonError(str(error) or "There is not enough memory to compare the pictures.") from error
+        raise
+    except MemoryError as error:
+        cancel()
+        raise ComparisonError("There is not enough memory to compare the pictures.") from error
+    except Exception as error:  # whatever it is, nothing may be left half done
+        cancel()
+        raise ComparisonError(f"The pictures could not be compared: {_reason(error)}") from error
     cancel()
     return False
 
@@ -107,7 +110,7 @@ def clear() -> None:
     """End what runs, forget the numbers, and remove the files behind the images."""
     cancel()
     _state.numbers = None
-    _remove_files()
+    compared_images.remove_files()
 
 
 def half(samples: int) -> int:
@@ -124,7 +127,8 @@ def resolution(scene: Any, percent: int) -> tuple[int, int]:
 
 def lost_edits() -> list[str]:
     """Names of images with pixels that no file holds: the other Blender shows them as they are in their files."""
-    return [image.name for image in bpy.data.images if image.is_dirty and image.name not in IMAGES.values()]
+    ours = compared_images.IMAGES.values()
+    return [image.name for image in bpy.data.images if image.is_dirty and image.name not in ours]
 
 
 def _check(scene: Any) -> None:
@@ -164,43 +168,12 @@ def _save_copy(folder: Path) -> Path:
     try:
         bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, relative_remap=True, compress=False)
     except RuntimeError as error:
-        reason = str(error).strip().removeprefix("Error: ")
-        raise ComparisonError(f"The scene could not be saved for the comparison: {reason}") from error
+        raise ComparisonError(f"The scene could not be saved for the comparison: {_reason(error)}") from error
     finally:
         bpy.data.use_autopack = packs
     return path
 
 
-def _keep(found: Compared) -> None:
-    """Make images of the pictures, in place of those of the last comparison. Raises OSError."""
-    folder = _new_folder()
-    try:
-        for attribute in IMAGES:
-            picture = getattr(found, attribute)[::-1]
-            write_channels(folder / f"{attribute}.exr", {letter: picture[..., i] for i, letter in enumerate("RGB")})
-    except OSError:
-        shutil.rmtree(folder, ignore_errors=True)
-        raise
-    for attribute, name in IMAGES.items():
-        _replace(name, folder / f"{attribute}.exr")
-    _remove_files()
-    _state.folder, _state.numbers = folder, found.numbers
-
-
-def _replace(name: str, path: Path) -> None:
-    """Load a scene-linear picture as the image `name`, wherever an image of that name was used."""
-    old = bpy.data.images.get((name, None))
-    image: Any = bpy.data.images.load(str(path))
-    working = getattr(bpy.data, "colorspace", None)  # from Blender 5.0 a file has its own
-    image.colorspace_settings.name = working.working_space if working else "Linear Rec.709"
-    image.use_view_as_render = True
-    if old is not None:
-        old.user_remap(image)
-        bpy.data.images.remove(old)
-    image.name = name
-
-
-def _remove_files() -> None:
-    if _state.folder is not None:
-        shutil.rmtree(_state.folder, ignore_errors=True)
-        _state.folder = None
+def _reason(error: Exception) -> str:
+    """What an error says, without the word that Blender starts it with."""
+    return str(error).strip().removeprefix("Error: ") or type(error).__name__

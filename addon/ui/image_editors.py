@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Showing an image as Blender shows a finished render."""
+"""Showing an image in an Image Editor."""
 
 from typing import Any
 
@@ -15,7 +15,9 @@ _SETTLE_SECONDS = 0.1
 def show(image: Any, context: Any) -> bool:
     """Show `image`, with its tab of the sidebar, in an Image Editor; whether there is one.
 
-    An editor that is open is taken, else one is opened as the preferences say for renders.
+    An editor that is open is taken, else a new window, unless the preferences want renders to open nothing. No other
+    editor is turned into one, as they may want for renders: only of a render does Blender know what was there before.
+    Raises RuntimeError where Blender cannot open a window.
     """
     area = _open_editor(context) or _new_editor(context)
     if area is None:
@@ -51,14 +53,10 @@ def _open_editor(context: Any) -> Any | None:
 
 
 def _new_editor(context: Any) -> Any | None:
-    """An Image Editor where the preferences want renders to be shown; None where they want no new one."""
-    wanted = context.preferences.view.render_display_type
-    if wanted == "NONE":
+    """An Image Editor in a window of its own; None where the preferences want renders to open nothing."""
+    if context.preferences.view.render_display_type == "NONE":
         return None
-    if wanted == "WINDOW":
-        bpy.ops.wm.window_new()
-        area = context.window_manager.windows[-1].screen.areas[0]
-    else:
-        area = max(context.window.screen.areas, key=lambda item: item.width * item.height)
+    bpy.ops.wm.window_new()
+    area = context.window_manager.windows[-1].screen.areas[0]
     area.ui_type = "IMAGE_EDITOR"
     return area

@@ -12,7 +12,7 @@ import bpy
 
 sys.path.append(sys.argv[sys.argv.index("--") + 1])
 
-from steps import frames, install, module, results, run, screenshot, wait, window, write
+from steps import frames, install, module, results, run, screenshot, viewports, wait, window, write
 
 ENDLESS = 1_000_000
 """More samples than a test has time for."""
@@ -49,8 +49,8 @@ def ask(samples: int, percent: int) -> Iterator[None]:
 
 
 def start(samples: int, percent: int) -> None:
-    """Start one as a script does, without the dialog."""
-    with bpy.context.temp_override(window=window()):
+    """Start one as a timer's script does, without the dialog, and without a window in its context."""
+    with bpy.context.temp_override(window=None):
         bpy.ops.deep_gbuffer.compare_with_cycles("EXEC_DEFAULT", samples=samples, percent=percent)
 
 
@@ -113,7 +113,8 @@ def scenario() -> Iterator[None]:
     yield from cancelled(scene)
     yield from finished(scene)
     yield from switched()
-    yield from another_file(scene)
+    yield from undone()
+    yield from another_file()
     yield from leave()
 
 
@@ -136,7 +137,10 @@ def cancelled(scene) -> Iterator[None]:
 
 
 def finished(scene) -> Iterator[None]:
-    """One opens a window, as Blender's renders do; the next one takes the editor that is open."""
+    """One opens a window though renders are wanted full screen; the next one takes the editor that is open."""
+    bpy.context.preferences.view.render_display_type = "SCREEN"
+    with bpy.context.temp_override(window=window()):
+        bpy.ops.ed.undo_push(message="The last edit before comparing")
     for name, percent in (("compared", 20), ("compared_again", 10)):
         before = settings()
         start(4, percent)
@@ -152,6 +156,7 @@ def finished(scene) -> Iterator[None]:
             "sidebars": [space.show_region_ui for space in shown],
             "tables": module("ui.compare_panels").tables(comparing().numbers()),
             "unchanged": settings() == before,
+            "viewports": len(viewports()),
             "files": [bpy.data.filepath, *recent_files()],
         }
 
@@ -166,9 +171,24 @@ def switched() -> Iterator[None]:
     results["switched_to"] = [space.image.name for space in editors()]
 
 
-def another_file(scene) -> Iterator[None]:
+def undone() -> Iterator[None]:
+    """Undo leaves the pictures where they are."""
+    with bpy.context.temp_override(window=window()):
+        bpy.context.scene.deep_gbuffer.samples = 7
+        bpy.ops.ed.undo_push(message="An edit after comparing")
+        bpy.ops.ed.undo()
+    yield from frames(20)
+    screenshot("undone")
+    results["undone"] = {
+        "samples": bpy.context.scene.deep_gbuffer.samples,
+        "images": left()["images"],
+        "shown": [space.image.name if space.image else None for space in editors()],
+    }
+
+
+def another_file() -> Iterator[None]:
     """Loading a file ends it."""
-    scene.deep_gbuffer.samples = ENDLESS
+    bpy.context.scene.deep_gbuffer.samples = ENDLESS
     start(4, 20)
     yield from wait(rendering)
     bpy.ops.wm.read_homefile()

@@ -4,6 +4,7 @@
 import json
 import shutil
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -69,7 +70,17 @@ def comparison_fixture(window_blender: Path, tmp_path_factory: pytest.TempPathFa
     return run_scenario(window_blender, tmp_path_factory.mktemp("comparison"), "comparison_driver.py")
 
 
-def run_scenario(root: Path, kept: Path, driver: str) -> WindowRun:
+@pytest.fixture(scope="session", name="background")
+def background_fixture(window_blender: Path, tmp_path_factory: pytest.TempPathFactory) -> WindowRun:
+    """The scenario of background_driver.py, run once; there is no screen at all."""
+    return run_scenario(window_blender, tmp_path_factory.mktemp("background"), "background_driver.py", WITHOUT_SCREEN)
+
+
+ON_A_SCREEN = ("python3", "{folder}/xvfb.py", "blender", "--python")
+WITHOUT_SCREEN = ("blender", "--background", "--python-exit-code", "1", "--python")
+
+
+def run_scenario(root: Path, kept: Path, driver: str, starting: Sequence[str] = ON_A_SCREEN) -> WindowRun:
     """Run a scenario in a fresh Blender with a scratch profile and the built zip; what it left goes to `kept`."""
     (root / "var/tmp").mkdir(parents=True, exist_ok=True)
     folder = Path(tempfile.mkdtemp(prefix="deep_gbuffer_", dir=root / "var/tmp"))
@@ -80,8 +91,8 @@ def run_scenario(root: Path, kept: Path, driver: str) -> WindowRun:
             shutil.copy(HERE / name, folder)
         env = {"LIBGL_ALWAYS_SOFTWARE": "1", "HOME": str(inside), "BLENDER_USER_RESOURCES": str(inside / "profile")}
         blender_window.run(root, ["blender", "--background", "--python-expr", PREFERENCES], env, TIMEOUT_SECONDS)
-        command = ["python3", inside / "xvfb.py", "blender", "--python", inside / driver, "--", inside]
-        done = blender_window.run(root, [str(item) for item in command], env, TIMEOUT_SECONDS)
+        command = [*(part.format(folder=inside) for part in starting), f"{inside}/{driver}", "--", str(inside)]
+        done = blender_window.run(root, command, env, TIMEOUT_SECONDS)
         for path in [*folder.glob("*.png"), *folder.glob("*.json")]:
             shutil.copy(path, kept)
         return WindowRun(kept, done.stdout)

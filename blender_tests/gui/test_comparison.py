@@ -45,6 +45,7 @@ def test_it_opens_a_window_with_the_difference_and_the_sidebar(comparison):
     assert found["images"] == IMAGES
     assert (found["windows"], found["shown"], found["sizes"]) == (2, [DIFFERENCE], [[384, 216]])
     assert found["sidebars"] == [True]
+    assert found["viewports"] == 1  # the largest area is still what it was
 
 
 @pytest.mark.parametrize("name", ["compared", "compared_again"])
@@ -69,7 +70,7 @@ def test_the_picture_and_the_numbers_are_on_the_screen(comparison, name):
     assert (picture.max(axis=-1) < 0.1).mean() > 0.9  # both engines agree but for noise and edges
     assert (picture.max(axis=-1) > 0.2).sum() > 300  # edges, where one Cycles sample more or less shows
     rows = (sidebar.max(axis=-1) > TEXT).any(axis=1)
-    assert (np.diff(rows.astype(int)) == 1).sum() >= 13  # lines of text: 4 of the renders, 9 of the error, 2 titles
+    assert (np.diff(rows.astype(int)) == 1).sum() >= 14  # lines of text: 4 of the renders, 9 of the error, 3 titles
 
 
 def test_the_buttons_switch_to_the_other_pictures(comparison):
@@ -78,6 +79,26 @@ def test_the_buttons_switch_to_the_other_pictures(comparison):
     lit_side = np.s_[400:540, 680:800]  # of the cube, as large as before
     assert difference[lit_side].max() < 0.2
     assert cycles[lit_side].min() > 0.35
+
+
+def test_undo_leaves_the_pictures_where_they_are(comparison):
+    assert comparison.results["undone"]["samples"] == 4
+    assert comparison.results["undone"]["images"] == IMAGES
+    assert comparison.results["undone"]["shown"] == ["Comparison: Cycles"]
+    before, after = comparison.screen("switched"), comparison.screen("undone")
+    picture = np.s_[190:650, 400:870]
+    assert np.abs(before[picture] - after[picture]).max() < 0.05
+
+
+def test_in_background_it_runs_to_its_end_and_tells_how_far_it_is(background):
+    assert background.results.get("done") == ["FINISHED"], background.output[-3000:]
+    assert background.results["images"] == IMAGES
+    assert background.results["folders"] == 1
+    rows = dict(row for _, rows in background.results["tables"] for row in rows)
+    assert rows["Size"] == "192 × 108"
+    assert float(rows["RMSE"]) < 0.02
+    assert "Compare with Cycles: 0% | Starting Blender" in background.output
+    assert "Traceback" not in background.output, background.output
 
 
 def test_the_numbers_are_those_of_two_engines_that_agree(comparison):
