@@ -137,8 +137,11 @@ class Comparison:
             if made.picture is not None and made.seconds is not None
         }
         if code != 0 or renders.keys() != SHARES.keys():
-            said = " ".join(self._tail) or "It said nothing."
-            raise ComparisonError(f"The Blender that renders ended too early (exit code {code}). {said}")
+            said = f"It last said: {' '.join(self._tail)}" if self._tail else "It said nothing."
+            raise ComparisonError(
+                f"The second Blender, which renders in the background, ended too early (exit code {code}); the scene "
+                f"is as it was. {said}"
+            )
         return renders
 
     def cancel(self) -> None:

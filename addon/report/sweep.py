@@ -32,7 +32,7 @@ class Point:
 
     @property
     def identity(self) -> tuple[str, tuple[tuple[str, str], ...]]:
-        """Equal for points that render the same whatever they are called."""
+        """Equal for points with the same settings, whatever they are called."""
         return self.engine, tuple(sorted(self.settings.items()))
 
 
@@ -131,7 +131,7 @@ SWEEP = (
 
 
 def points(*, quick: bool) -> list[Point]:
-    """Every point of the table; those that render the same under two names only under the first."""
+    """Every point of the table; those with the same settings under two names only under the first."""
     found: dict[object, Point] = {}
     for series in SWEEP:
         for point in series.points(quick=quick):

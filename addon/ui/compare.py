@@ -76,6 +76,7 @@ class DEEP_GBUFFER_OT_compare_with_cycles(bpy.types.Operator):
                 self.report({"WARNING"}, f"Unsaved pixels are not compared, save or pack these: {', '.join(lost)}")
             if bpy.app.background:
                 _run_to_the_end()
+                self.report({"INFO"}, _result())
             else:
                 _follow(context)
         except ComparisonError as error:
@@ -111,8 +112,10 @@ class DEEP_GBUFFER_OT_follow_comparison(bpy.types.Operator):
             goes_on = comparing.step()
             if goes_on:
                 _show_progress(context.window_manager)
-            elif not image_editors.show(bpy.data.images[compared_images.DIFFERENCE], context):
-                self.report({"INFO"}, f"The image “{compared_images.DIFFERENCE}” shows how far the pictures are apart.")
+            else:
+                shown = image_editors.show(bpy.data.images[compared_images.DIFFERENCE], context)
+                where = "" if shown else f"; see the image “{compared_images.DIFFERENCE}”"
+                self.report({"INFO"}, f"{_result()}{where}")
         except comparing.CancelledError as cancelled:
             self.report({"INFO"}, str(cancelled))
         except RuntimeError as error:  # ComparisonError, or Blender's own where it cannot show the image
@@ -211,6 +214,16 @@ def _run_to_the_end() -> None:
     finally:
         comparing.cancel()
         signal.signal(signal.SIGINT, usual or signal.SIG_DFL)
+
+
+def _result() -> str:
+    """What the last comparison found, in one line."""
+    numbers = comparing.numbers()
+    return (
+        f"Compared with Cycles: RMSE {numbers.errors.rmse:.4g}, noise of Cycles {numbers.noise_rmse:.2g}"
+        if numbers
+        else ""
+    )
 
 
 def _status() -> str:

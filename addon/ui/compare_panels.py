@@ -56,6 +56,8 @@ class DEEP_GBUFFER_PT_compared(bpy.types.Panel):
             title = name.removeprefix("Comparison: ")
             button = column.operator(DEEP_GBUFFER_OT_show_compared.bl_idname, text=title, depress=name == shown)
             button.image = name
+        if shown == compared_images.DIFFERENCE:
+            self.layout.label(text="Black where the two are equal")
         numbers = comparing.numbers()
         assert numbers is not None  # by poll
         for title, rows in tables(numbers):
@@ -83,7 +85,7 @@ def tables(numbers: Numbers) -> list[tuple[str, list[tuple[str, str]]]]:
             ],
         ),
         (
-            "Time of a first render",
+            "Time (ours with start-up)",
             [
                 ("Deep G-Buffer", f"{numbers.our_seconds:.2f} s"),
                 ("Cycles", f"{numbers.cycles_seconds:.2f} s"),

@@ -48,8 +48,9 @@ def state():
     }
 
 
-def test_the_pictures_are_images_and_the_numbers_are_theirs(scene):
+def test_the_pictures_are_images_and_the_numbers_are_theirs(scene, capfd):
     assert compare() == {"FINISHED"}
+    assert f"Compared with Cycles: RMSE {comparing.numbers().errors.rmse:.4g}" in capfd.readouterr().out
     ours, cycles, difference = (pixels(name) for name in compared_images.IMAGES)
     for attribute, name in compared_images.IMAGES.items():
         image = bpy.data.images[name]
