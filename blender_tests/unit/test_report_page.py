@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What people read of a report: a page whole in itself, safe whatever files are called, and never half there."""
 
+import colorsys
 import math
 import re
 from dataclasses import replace
@@ -11,11 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from addon.report.sweep import Point
 from blender_tests.report_builders import SIZE, errors, measurement, picture, report, scene, swept
-from tooling.report import crops, html_page, labels, markdown_page, page, panels, plots, summary, tables, words
+from tooling.report import crops, html_page, labels, markdown_page, page, panels, plots, tables, words
 from tooling.report.html_page import Media, Shot
 
 VOID = {"meta", "img", "input", "br"}
@@ -160,19 +161,43 @@ def test_sequences_have_a_column_of_flicker_and_single_frames_have_none():
     assert "flicker" not in [metric.key for metric in panels.metrics(still)]
 
 
-def test_the_summary_tells_who_is_best_in_a_second():
-    peer = measurement(Point("Cycles, denoised", "1 spp", "CYCLES", {"use_denoising": "True"}), warm=(0.6,), flip=0.2)
-    ours, slow = measurement(warm=(0.4,), flip=0.1), measurement(warm=(9.0,), flip=0.005, digest="other")
-    others = (Point("Samples", "1 spp", "DEEP_GBUFFER", {}), Point("EEVEE", "1 spp", "EEVEE", {}))
-    hasty = [measurement(point, warm=(0.05,), flip=0.9) for point in others]
-    made = scene([*hasty, ours, slow, peer])
-    first, second, third = summary.sentences(tables.rows(made, "5.2"), made)
-    assert first.startswith(
-        "Within 1 s the lowest FLIP is 0.100, by Deep G-Buffer (Samples: 4 spp, 0.40 s); the best of"
-    )
-    assert second.endswith("in that time Deep G-Buffer reaches 0.100 (Samples: 4 spp, 0.40 s).")
-    assert third.startswith("1 point has a FLIP below the reference's own noise")
-    assert summary.sentences([], made) == []
+def test_drawing_on_the_processor_is_told_to_be_no_graphics_card():
+    for driver in ("llvmpipe (LLVM 19.1.7, 256 bits)", "softpipe", "Software Rasterizer swrast"):
+        made = report(scene([measurement()]), machine=f"Some Processor; {driver}")
+        assert "no graphics card: on one, EEVEE" in said(read(html_page.document(made, [Media()])))
+        assert "no graphics card: on one, EEVEE" in markdown_page.document(made, [[]])
+    assert words.machine("Some Processor; NVIDIA H100") == "Some Processor; NVIDIA H100"
+
+
+def test_our_points_are_called_ours_and_the_others_are_not():
+    made = report(scene([measurement(digest="same"), *swept()[-1:], measurement(digest="same")]))
+    markdown = markdown_page.document(made, [["plots/box.png", "crops/box.jpg"]])
+    assert "| ★ Deep G-Buffer · Samples: 4 spp |" in markdown
+    assert re.search(r"\n\| (★ )?Workbench \|", markdown)
+    assert "picture of Deep G-Buffer · Samples: 4 spp: Samples: 4 spp." in markdown
+    assert markdown.count(crops.RULE) == 1
+    assert markdown.index("(crops/box.jpg)") < markdown.index(crops.HEAT) < markdown.index("| ★")
+    assert crops.RULE not in markdown_page.document(made, [["plots/box.png"]])
+
+
+def test_looks_of_the_other_engines_are_their_own():
+    def hue(color):
+        red, green, blue = (int(color[start : start + 2], 16) / 255.0 for start in (1, 3, 5))
+        return colorsys.rgb_to_hls(red, green, blue)[0] * 360.0
+
+    assert not {shape for _, shape in plots.OUR_LOOKS} & {shape for _, shape in plots.PEER_LOOKS}
+    for color, _ in plots.PEER_LOOKS:
+        apart = [abs(hue(color) - hue(ours)) for ours, _ in plots.OUR_LOOKS if ours != "#000000"]
+        assert min(min(each, 360.0 - each) for each in apart) > 10.0
+
+
+def test_captions_fit_into_their_columns():
+    draw = ImageDraw.Draw(Image.new("RGB", (1, 1)))
+    for row in tables.rows(scene(swept(quick=False)), "5.2"):
+        lines = crops.caption(row.title)
+        assert len(lines) <= 2
+        assert " ".join(lines) == row.title
+        assert all(draw.textlength(line, font_size=crops.FONT) <= crops.COLUMN for line in lines)
 
 
 def test_a_perfect_picture_has_a_place_on_a_logarithmic_axis():

@@ -111,6 +111,12 @@ def test_medians_are_over_all_processes_and_an_untimed_point_has_none():
     assert math.isnan(untimed.warm_s)
     assert not untimed.pareto
     assert columns.cells(untimed, sequence=True)[1:3] == ["–", "–"]
+    assert columns.cells(row, sequence=True)[1:3] == ["2.00", "1.00–3.00"]
+
+
+def test_a_single_render_has_no_range():
+    row = tables.rows(scene([measurement(warm=(3.0,))]), "5.2")[0]
+    assert columns.cells(row, sequence=False)[1:3] == ["3.00", "once"]
 
 
 @pytest.mark.parametrize(

@@ -40,13 +40,15 @@ def headings(*, sequence: bool) -> list[str]:
 
 
 def cells(row: Row, *, sequence: bool) -> list[str]:
-    """A row's texts below `headings`. A star is put before points on the Pareto front."""
+    """A row's texts below `headings`. A star is put before points on the Pareto front.
+
+    One warm render has no spread, and says nothing about how repeatable it is.
+    """
     bias = ", ".join(signed(value) for value in (row.bias_red, row.bias_green, row.bias_blue))
-    spread = f"{seconds(row.warm_least_s)}–{seconds(row.warm_greatest_s)}" if row.warm_renders else UNKNOWN
     return [
-        f"{ON_FRONT} {row.name}" if row.pareto else row.name,
+        f"{ON_FRONT} {row.title}" if row.pareto else row.title,
         seconds(row.warm_s),
-        spread,
+        _spread(row),
         seconds(row.cold_s),
         number(row.flip),
         number(row.rmse),
@@ -56,6 +58,13 @@ def cells(row: Row, *, sequence: bool) -> list[str]:
         number(row.fireflies),
         *([number(row.flicker)] if sequence else []),
     ]
+
+
+def _spread(row: Row) -> str:
+    """Least and greatest warm seconds, `once` where there was one render."""
+    if row.warm_renders > 1:
+        return f"{seconds(row.warm_least_s)}–{seconds(row.warm_greatest_s)}"
+    return "once" if row.warm_renders else UNKNOWN
 
 
 def signed(value: float) -> str:

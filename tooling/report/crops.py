@@ -2,6 +2,7 @@
 """Pictures of a scene side by side: the reference, our best and the other engines', and where they are wrong."""
 
 import io
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -25,6 +26,7 @@ RULE = (
     "FLIP in that time or, where none is so fast, the fastest. The rectangle is where the errors of these pictures "
     "differ most."
 )
+HEAT = "Below each rectangle is FLIP's error map: black is equal, purple, orange and yellow more and more different."
 SHARE = 3
 """The rectangle has this part of the picture's width and height."""
 STEPS = 24
@@ -35,8 +37,12 @@ COLUMN = 240
 """Width in pixels of a picture on the sheet."""
 GAP = 6
 """Pixels between columns of the sheet."""
-CAPTION = 36
-"""Height in pixels of the two lines above a picture on the sheet."""
+LETTERS = 32
+"""Of a caption's line; more than that do not surely fit into a column."""
+LINE = 17
+"""Height in pixels of a caption's line."""
+FONT = 13
+"""Size in pixels of a caption's letters."""
 QUALITY = 85
 """Of the sheet."""
 
@@ -117,8 +123,7 @@ def _view(
 ) -> View:
     """A point's pictures."""
     whole = _picture(measurement.judgement.picture, size)
-    name = f"Deep G-Buffer, {row.name}" if is_ours(row) else row.name
-    return View(name, f"{seconds(row.warm_s)} s, FLIP {number(row.flip)}", whole, whole.crop(box), heat.crop(box))
+    return View(row.title, f"{seconds(row.warm_s)} s, FLIP {number(row.flip)}", whole, whole.crop(box), heat.crop(box))
 
 
 def _picture(path: Path, size: tuple[int, int]) -> Image.Image:
@@ -148,21 +153,28 @@ def jpeg(image: Image.Image, quality: int) -> bytes:
     return data.getvalue()
 
 
+def caption(text: str) -> list[str]:
+    """A text as lines that fit into a column."""
+    return textwrap.wrap(text, LETTERS)
+
+
 def sheet(scene: Views) -> bytes:
     """All views as one JPEG: whole pictures with the rectangle drawn in, below them the rectangle and its errors."""
     width, height = scene.views[0].whole.size
     tile = (COLUMN, max(1, round(COLUMN * height / width)))
-    whole = Image.new("RGB", ((COLUMN + GAP) * len(scene.views) - GAP, CAPTION + 3 * tile[1]), "white")
+    captions = [[*caption(view.name), *caption(view.note)] for view in scene.views]
+    top = LINE * max(len(lines) for lines in captions)
+    whole = Image.new("RGB", ((COLUMN + GAP) * len(scene.views) - GAP, top + 3 * tile[1]), "white")
+    draw = ImageDraw.Draw(whole)
     for column, view in enumerate(scene.views):
         left = column * (COLUMN + GAP)
-        caption = Image.new("RGB", (COLUMN, CAPTION), "white")
-        ImageDraw.Draw(caption).text((0, 2), f"{view.name}\n{view.note}", fill="black", font_size=13)
-        whole.paste(caption, (left, 0))
+        for line, words in enumerate(captions[column]):
+            draw.text((left, LINE * line), words, fill="black", font_size=FONT)
         outlined = view.whole.copy()
         ImageDraw.Draw(outlined).rectangle(scene.box, outline="#FFD400", width=max(2, width // COLUMN))
         images = (outlined, view.crop, view.crop_heat)
         for line, image in enumerate(image for image in images if image is not None):
-            whole.paste(image.resize(tile, Image.Resampling.LANCZOS), (left, CAPTION + line * tile[1]))
+            whole.paste(image.resize(tile, Image.Resampling.LANCZOS), (left, top + line * tile[1]))
     data = io.BytesIO()
     whole.save(data, "JPEG", quality=QUALITY, optimize=True)
     return data.getvalue()

@@ -4,15 +4,22 @@
 TITLE = "Error against run time"
 INTRODUCTION = (
     "Each scene below was rendered in many ways: by Deep G-Buffer with different settings, and by Blender's own "
-    "engines Cycles, EEVEE and Workbench. Every picture is compared with a reference, a very long Cycles render of "
-    "the same scene, and every render is timed. What counts is both together: which picture is closest to the "
-    "reference after a given time."
+    "engines Cycles, EEVEE and Workbench. Every picture is compared with a reference, a Cycles render of the same "
+    "scene with many samples, and every render is timed. What counts is both together: which picture is closest to "
+    "the reference after a given time. Deep G-Buffer does not render indirect light, reflections of the scene or "
+    "transparency yet: where a scene has them, its pictures differ however many samples it takes."
 )
 QUICK = (
-    "This is a quick report: small pictures, few points, measured once, and a reference with more noise. It shows "
-    "where things stand; leave out --quick for figures to rely on."
+    "This is a quick report: few points, each rendered in one process (smaller pictures and a reference of fewer "
+    "samples unless told otherwise). It shows where things stand; leave out --quick for figures to rely on."
 )
-PEERS = "Plots: filled marks are Deep G-Buffer, hollow marks and dashed lines the other engines."
+LEFT_OUT = "Work that Deep G-Buffer skipped, as the scene and the settings do not need it; no picture changes by that"
+COMMANDS = "Commands that render each point again"
+COMMANDS_NOTE = (
+    "Times of the first render are cold only with an empty shader cache. The report switches compositing and the "
+    "sequencer off, which these commands do not: a file that uses them gives another picture."
+)
+PEERS = "Plots: filled marks are Deep G-Buffer, hollow triangles and dashed lines the other engines."
 FRONT = (
     "★ and the grey staircase in the plots mark the Pareto front: the points that no other beats in both time and "
     "error. The star in the tables is for FLIP."
@@ -22,7 +29,8 @@ TERMS = (
         "FLIP",
         "lower is better",
         "How different two pictures look to a person who flips between them, by NVIDIA's FLIP: 0 is equal, 1 as "
-        "different as can be. It judges pictures as displayed, with the view transform Standard whatever the file's.",
+        "different as can be. It judges pictures as displayed, with the view transform Standard whatever the file's. "
+        "To judge a figure, look at the pictures below.",
     ),
     (
         "RMSE",
@@ -48,7 +56,8 @@ TERMS = (
     (
         "fireflies",
         "lower is better",
-        "99.9th percentile of how much brighter than the reference a pixel is: single bright specks.",
+        "99.9th percentile of how much brighter than the reference a pixel is: bright specks, but also areas that are "
+        "too bright; a picture that is too dark hides its specks.",
     ),
     (
         "flicker",
@@ -60,13 +69,27 @@ TERMS = (
         "warm and cold",
         "",
         "Seconds per frame. Cold is the first render of a new process with an empty shader cache, without loading the "
-        "file; warm are further renders of the same process with Persistent Data. Warm times are medians, with the "
-        "least and the greatest beside them.",
+        "file; warm are further renders of the same process with Persistent Data: for a single frame, the same "
+        "unchanged frame again. Warm times are medians, with the least and the greatest beside them where there were "
+        "several renders.",
     ),
     (
         "noise floor",
         "",
         "The reference is itself a render with some noise left, which was estimated from two independent halves of its "
-        "samples. Errors below it mean nothing, and differences between points that are smaller than it mean little.",
+        "samples or, where the reference was given with the file, from two further short renders by Cycles. Close to "
+        "it, errors and differences between points mean little; far above it small differences can be real. It is "
+        "known for FLIP and RMSE.",
+    ),
+    (
+        "other engines",
+        "",
+        "Cycles renders without clamping and adaptive sampling; its denoiser is OpenImageDenoise with prefilter and "
+        "quality Fast. EEVEE renders with ray tracing and without baked probes. Everything else is as in the file.",
+    ),
+    (
+        "Resolution scale",
+        "",
+        "The picture is rendered smaller, at this part of its width and height, and enlarged bilinearly.",
     ),
 )

@@ -8,10 +8,10 @@ from html import escape
 from pathlib import Path
 
 from tooling.report import columns, explained, summary
-from tooling.report.crops import RULE
+from tooling.report.crops import HEAT, RULE
 from tooling.report.results import Report, SceneReport
 from tooling.report.tables import Row, rows
-from tooling.report.words import SAME_PICTURES, left_out, own_left_out, reference, rounds, subject
+from tooling.report.words import SAME_PICTURES, left_out, machine, own_left_out, reference, rounds, subject
 
 STYLE = Path(__file__).with_name("page.css")
 
@@ -60,7 +60,7 @@ def _header(report: Report) -> str:
         for index, scene in enumerate(report.scenes, start=1)
     ]
     facts = {
-        "Machine": report.machine,
+        "Machine": machine(report.machine),
         "Blender": report.blender,
         "Deep G-Buffer": f"commit {report.commit}",
         "Made": report.made,
@@ -128,8 +128,7 @@ def _shots(index: int, media: Media) -> str:
         '<h3>Pictures</h3>\n<fieldset class="flip">\n'
         "<legend>Choose a picture; the arrow keys flip between them</legend>\n"
         f'{"".join(choices)}<div class="stage">\n{"".join(stage)}</div>\n</fieldset>\n'
-        f'<div class="crops">\n{"".join(crops)}</div>\n<p class="small">{escape(RULE)} Below each is FLIP\'s error '
-        "map: black is equal, purple, orange and yellow more and more different.</p>\n"
+        f'<div class="crops">\n{"".join(crops)}</div>\n<p class="small">{escape(f"{RULE} {HEAT}")}</p>\n'
     )
 
 
@@ -167,13 +166,16 @@ def _row(row: Row, cells: Sequence[str], left: Sequence[str]) -> str:
 def _left_out(found: Sequence[Row]) -> str:
     """What our engine did not do for which points, and why."""
     groups = "".join(f"<p>{escape(who)}:</p>\n{_list(reasons)}" for who, reasons in left_out(found))
-    return f"<details>\n<summary>What Deep G-Buffer left out, and why</summary>\n{groups}</details>\n" if groups else ""
+    return f"<details>\n<summary>{escape(explained.LEFT_OUT)}</summary>\n{groups}</details>\n" if groups else ""
 
 
 def _commands(found: Sequence[Row]) -> str:
     """The command of each point."""
-    lines = "".join(f"<dt>{escape(row.name)}</dt><dd><pre>{escape(row.command)}</pre></dd>\n" for row in found)
-    return f"<details>\n<summary>Commands that repeat each point</summary>\n<dl>\n{lines}</dl>\n</details>\n"
+    lines = "".join(f"<dt>{escape(row.title)}</dt><dd><pre>{escape(row.command)}</pre></dd>\n" for row in found)
+    return (
+        f"<details>\n<summary>{escape(explained.COMMANDS)}</summary>\n<p>{escape(explained.COMMANDS_NOTE)}</p>\n"
+        f"<dl>\n{lines}</dl>\n</details>\n"
+    )
 
 
 def _problems(problems: Sequence[str]) -> str:

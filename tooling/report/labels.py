@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-DISTANCES = (7.0, 16.0, 28.0, 42.0)
+DISTANCES = (7.0, 16.0, 28.0, 42.0, 58.0)
 """From a mark to its text, in points; the nearest that is free is taken."""
 LEADER = 12.0
 """From this distance on a thin line joins mark and text."""
@@ -17,6 +17,10 @@ SIDES = {1: "left", 0: "center", -1: "right"}
 ENDS = {1: "bottom", 0: "center", -1: "top"}
 MARK = 5.0
 """Half the extent of a mark, in points."""
+NEAR = 12.0
+"""Within this distance of another mark, in points, a text would seem to be that one's."""
+NEARNESS = 1.0
+"""Area near another mark counts this much of area that covers something."""
 
 Box = tuple[float, float, float, float]
 """Left, bottom, right, top in pixels."""
@@ -45,11 +49,20 @@ class Place:
         slant = 0.75 if all(self.direction) else 1.0
         return self.direction[0] * self.distance * slant, self.direction[1] * self.distance * slant
 
+    @property
+    def has_leader(self) -> bool:
+        """Whether a line joins mark and text."""
+        return self.distance > LEADER
+
     def box(self, mark: Any, width: float, height: float, pixels: float) -> Box:
         """The box of a text of this width and height beside `mark`, in pixels, of which a point has so many."""
         left = mark[0] + self.offset[0] * pixels + 0.5 * (self.direction[0] - 1) * width
         bottom = mark[1] + self.offset[1] * pixels + 0.5 * (self.direction[1] - 1) * height
         return left, bottom, left + width, bottom + height
+
+
+PLACES = [Place(far, direction) for far, direction in product(DISTANCES, DIRECTIONS)]
+"""Where a text may stand, the best first."""
 
 
 def overlap(box: Box, others: Sequence[Box]) -> float:
@@ -66,29 +79,67 @@ def outside(box: Box, frame: Box) -> float:
 
 
 def place(axes: Any, labels: Sequence[Label], lines: Sequence[Sequence[tuple[float, float]]], size: float) -> None:
-    """Write the labels into matplotlib's `axes` at `size` points; the first ones get the best places.
+    """Write the labels into matplotlib's `axes` at `size` points; those with the fewest free places choose first.
 
     `lines`: corners, in data coordinates, of lines to keep clear of. The axes' limits, scales and place must be final.
     """
-    figure = axes.figure
-    renderer = figure.canvas.get_renderer()
-    pixels = figure.dpi / 72.0
+    renderer = axes.figure.canvas.get_renderer()
+    pixels = axes.figure.dpi / 72.0
     edges = axes.get_window_extent(renderer)
-    frame: Box = (edges.x0, edges.y0, edges.x1, edges.y1)
-    taken = [_around(axes.transData.transform((each.x, each.y)), MARK * pixels) for each in labels]
+    marks = [axes.transData.transform((each.x, each.y)) for each in labels]
+    taken = [_around(mark, MARK * pixels) for mark in marks]
     for line in lines:
         taken += _along([axes.transData.transform(corner) for corner in line], pixels)
-    for each in labels:
-        extent = axes.text(0.0, 0.0, each.text, transform=axes.transAxes, fontsize=size)
-        bounds = extent.get_window_extent(renderer)
-        extent.remove()
-        mark = axes.transData.transform((each.x, each.y))
-        places = [Place(far, direction) for far, direction in product(DISTANCES, DIRECTIONS)]
-        boxes = [where.box(mark, bounds.width, bounds.height, pixels) for where in places]
-        blocked = [overlap(box, taken) + 4.0 * outside(box, frame) for box in boxes]
-        best = min(range(len(places)), key=lambda index: (round(blocked[index]), index))
-        taken.append(boxes[best])
-        _write(axes, each, places[best], size)
+    boxes = [
+        _boxes(mark, _extent(axes, each.text, size, renderer), pixels) for each, mark in zip(labels, marks, strict=True)
+    ]
+    frame: Box = (edges.x0, edges.y0, edges.x1, edges.y1)
+    costs = [
+        _costs(mark, boxes[index], (*marks[:index], *marks[index + 1 :]), taken, frame, pixels)
+        for index, mark in enumerate(marks)
+    ]
+    texts: list[Box] = []
+    for index in sorted(range(len(labels)), key=lambda index: sum(round(cost) == 0 for cost in costs[index])):
+        total = [cost + overlap(box, texts) for cost, box in zip(costs[index], boxes[index], strict=True)]
+        best = min(range(len(PLACES)), key=lambda place: (round(total[place]), place))
+        texts.append(boxes[index][best])
+        _write(axes, labels[index], PLACES[best], size)
+
+
+def _costs(
+    mark: Any, boxes: Sequence[Box], others: Sequence[Any], taken: Sequence[Box], frame: Box, pixels: float
+) -> list[float]:
+    """What is bad, in square pixels, about each of a text's boxes in `PLACES`, before there are other texts.
+
+    That is the area that covers what is taken, is near other marks or lies outside the frame, and a leader over others.
+    """
+    near = [_around(other, NEAR * pixels) for other in others]
+    hit = [_around(other, MARK * pixels) for other in others]
+    return [
+        overlap(box, taken)
+        + NEARNESS * overlap(box, near)
+        + 4.0 * outside(box, frame)
+        + sum(overlap(piece, hit) for piece in _leader(where, mark, pixels))
+        for where, box in zip(PLACES, boxes, strict=True)
+    ]
+
+
+def _extent(axes: Any, text: str, size: float, renderer: Any) -> tuple[float, float]:
+    """Width and height of a text in pixels."""
+    drawn = axes.text(0.0, 0.0, text, transform=axes.transAxes, fontsize=size)
+    bounds = drawn.get_window_extent(renderer)
+    drawn.remove()
+    return bounds.width, bounds.height
+
+
+def _boxes(mark: Any, extent: tuple[float, float], pixels: float) -> list[Box]:
+    """The boxes of a text of this extent in all `PLACES`."""
+    return [where.box(mark, *extent, pixels) for where in PLACES]
+
+
+def _leader(where: Place, mark: Any, pixels: float) -> list[Box]:
+    """The line between a mark and its text, as boxes; empty where the text is so near that it has none."""
+    return _along([mark, mark + pixels * np.asarray(where.offset)], pixels) if where.has_leader else []
 
 
 def _around(centre: Any, reach: float) -> Box:
@@ -116,5 +167,5 @@ def _write(axes: Any, label: Label, where: Place, size: float) -> None:
         va=ENDS[where.direction[1]],
         color=label.color,
         fontsize=size,
-        arrowprops={"arrowstyle": "-", "color": "#999999", "linewidth": 0.6} if where.distance > LEADER else None,
+        arrowprops={"arrowstyle": "-", "color": "#999999", "linewidth": 0.6} if where.has_leader else None,
     )

@@ -6,9 +6,10 @@ from urllib.parse import quote
 
 from tooling.report import columns, explained, summary
 from tooling.report.columns import markdown_table, markdown_text
+from tooling.report.crops import HEAT, RULE
 from tooling.report.results import Report, SceneReport
 from tooling.report.tables import Row, rows
-from tooling.report.words import SAME_PICTURES, left_out, reference, rounds, subject
+from tooling.report.words import SAME_PICTURES, left_out, machine, reference, rounds, subject
 
 
 def document(report: Report, pictures: Sequence[Sequence[str]]) -> str:
@@ -16,8 +17,8 @@ def document(report: Report, pictures: Sequence[Sequence[str]]) -> str:
     parts = [
         f"# {explained.TITLE}\n\n{explained.INTRODUCTION}\n\n",
         f"{explained.QUICK}\n\n" if report.quick else "",
-        f"Machine: {markdown_text(report.machine)}. Blender {markdown_text(report.blender)}, Deep G-Buffer at commit "
-        f"{markdown_text(report.commit)}, {markdown_text(report.made)}.\n\n",
+        f"Machine: {markdown_text(machine(report.machine))}. Blender {markdown_text(report.blender)}, "
+        f"Deep G-Buffer at commit {markdown_text(report.commit)}, {markdown_text(report.made)}.\n\n",
         f"```\n{report.command}\n```\n\n{_problems(report.problems)}",
         f"{explained.PEERS} {explained.FRONT}\n\n",
         "".join(
@@ -41,6 +42,7 @@ def _scene(scene: SceneReport, found: Sequence[Row], files: Sequence[str]) -> st
     sequence = len(scene.subject.frames) > 1
     parts += [f"- {markdown_text(sentence)}\n" for sentence in summary.sentences(found, scene)]
     parts += [f"\n![{name}]({quote(file)})\n" for file in files]
+    parts += [f"\n{RULE} {HEAT}\n" for file in files if file.startswith("crops/")]
     body = [columns.cells(row, sequence=sequence) for row in found]
     parts.append(f"\n{markdown_table(columns.headings(sequence=sequence), body)}")
     parts.append(f"\n{rounds(scene)}\n{_copies(found)}{_left_out(found)}{_commands(found)}")
@@ -49,12 +51,13 @@ def _scene(scene: SceneReport, found: Sequence[Row], files: Sequence[str]) -> st
 
 def _copies(found: Sequence[Row]) -> str:
     """Which points are the same picture, each group in a line."""
+    titles = {row.name: row.title for row in found}
     groups: dict[str, list[str]] = {}
     for row in found:
         if row.same_picture_as:
             groups.setdefault(row.same_picture_as, []).append(row.name)
     lines = "".join(
-        f"\nBit for bit the picture of {markdown_text(first)}: {markdown_text(', '.join(others))}.\n"
+        f"\nBit for bit the picture of {markdown_text(titles[first])}: {markdown_text(', '.join(others))}.\n"
         for first, others in groups.items()
     )
     return f"{lines}\n{SAME_PICTURES}\n" if lines else ""
@@ -67,7 +70,7 @@ def _left_out(found: Sequence[Row]) -> str:
         for who, reasons in left_out(found)
     )
     return (
-        f"\n<details><summary>What Deep G-Buffer left out, and why</summary>\n\n{groups}</details>\n" if groups else ""
+        f"\n<details><summary>{markdown_text(explained.LEFT_OUT)}</summary>\n\n{groups}</details>\n" if groups else ""
     )
 
 
@@ -76,8 +79,8 @@ def _commands(found: Sequence[Row]) -> str:
     lines = "\n".join(row.command for row in found)
     fence = "```" if "```" not in lines else "~~~~"
     return (
-        "\n<details><summary>Commands that repeat each point, in the order of the table</summary>\n\n"
-        f"{fence}\n{lines}\n{fence}\n\n</details>\n"
+        f"\n<details><summary>{markdown_text(explained.COMMANDS)}, in the order of the table</summary>\n\n"
+        f"{explained.COMMANDS_NOTE}\n\n{fence}\n{lines}\n{fence}\n\n</details>\n"
     )
 
 

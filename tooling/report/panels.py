@@ -51,6 +51,11 @@ class Dot:
     is_zero: bool
     is_copy: bool
 
+    @property
+    def has_spread(self) -> bool:
+        """Whether times differ; a single render has no spread."""
+        return self.least < self.greatest
+
 
 @dataclass(frozen=True)
 class Line:

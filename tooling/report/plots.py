@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Error against warm time, log–log, as SVG for the page and as PNG for places that take no SVG.
 
-Ours are filled marks on solid lines, the other engines hollow ones on dashed lines. Colours are those of Okabe and Ito
-("Color Universal Design", 2008), which colour-blind people tell apart; shapes differ as well.
+Ours are filled marks on solid lines, the other engines hollow triangles on dashed lines. Most colours are those of
+Okabe and Ito ("Color Universal Design", 2008), which colour-blind people tell apart; shapes differ as well.
 """
 
 import io
@@ -24,7 +24,8 @@ OUR_LOOKS = (
     ("#CC79A7", "*"),
     ("#8C6D00", "p"),
 )
-PEER_LOOKS = (("#D55E00", "^"), ("#A6428A", "v"), ("#007A5A", "s"), ("#555555", "D"))
+PEER_LOOKS = (("#D55E00", "^"), ("#7B2CBF", "v"), ("#B0002A", "<"), ("#6B7280", ">"))
+"""Shapes and hues that no series of ours has."""
 COPY_COLOR = "#B5B5B5"
 FRONT_COLOR = "#D5D5D5"
 FRONT_POINTS = 4.0
@@ -198,7 +199,9 @@ def _draw_line(axes: Any, line: Line, color: str, shape: str) -> list[Label]:
     for dot in line.dots:
         tint = COPY_COLOR if dot.is_copy else color
         look = {"markersize": 4 if dot.is_copy else 8, "markerfacecolor": "white" if line.is_peer else tint}
-        spread = [[max(0.0, dot.seconds - dot.least)], [max(0.0, dot.greatest - dot.seconds)]]
+        spread = (
+            [[max(0.0, dot.seconds - dot.least)], [max(0.0, dot.greatest - dot.seconds)]] if dot.has_spread else None
+        )
         axes.errorbar(
             dot.seconds,
             dot.error,

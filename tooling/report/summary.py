@@ -1,15 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a scene's figures say, in sentences."""
 
+import math
 from collections.abc import Callable, Sequence
 
+from addon.report.engines import ENGINES
 from addon.report.sweep import OURS
-from tooling.report.columns import number, seconds
+from tooling.report.columns import number, seconds, signed
 from tooling.report.results import SceneReport
 from tooling.report.tables import Row
 
 BUDGETS = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 """Seconds that a person might wait."""
+SAMPLES = "Samples"
+"""The series of our engine whose points differ in nothing but the number of samples."""
+FLAT = 0.9
+"""More samples change little where they leave at least this part of FLIP."""
+BIASED = 0.5
+"""From this part of RMSE on, bias is a large part of it."""
 
 
 def is_ours(row: Row) -> bool:
@@ -36,8 +44,14 @@ def sentences(rows: Sequence[Row], scene: SceneReport) -> list[str]:
     """What to know about the scene before one looks at its plots; empty where nothing was measured."""
     if not rows:
         return []
-    parts = [_at_a_budget(rows), _against_the_peer(rows), _below_noise(rows, scene.reference.noise_flip)]
-    return [part for part in (*parts, _same_pictures(rows)) if part]
+    parts = [
+        _at_a_budget(rows),
+        _against_the_peer(rows),
+        _flattening(rows),
+        _below_noise(rows, scene.reference.noise_flip),
+        _same_pictures(rows),
+    ]
+    return [part for part in parts if part]
 
 
 def _at_a_budget(rows: Sequence[Row]) -> str:
@@ -65,11 +79,51 @@ def _against_the_peer(rows: Sequence[Row]) -> str:
     peer = fastest([row for row in rows if is_denoised_cycles(row)])
     if peer is None:
         return ""
-    told = f"Cycles with its denoiser has its first picture after {seconds(peer.warm_s)} s, FLIP {number(peer.flip)}"
+    told = f"The fastest denoised Cycles takes {seconds(peer.warm_s)} s warm, FLIP {number(peer.flip)}"
     ours = best_within([row for row in rows if is_ours(row)], peer.warm_s)
     if ours is None:
         return f"{told}; no point of Deep G-Buffer is that fast."
-    return f"{told}; in that time Deep G-Buffer reaches {number(ours.flip)} ({_point(ours)})."
+    ratio = f", {number(ours.flip / peer.flip, 2)} times as much" if peer.flip > 0.0 else ""
+    return f"{told}; in that time Deep G-Buffer reaches {number(ours.flip)}{ratio} ({_point(ours)})."
+
+
+def bias_share(row: Row) -> float:
+    """How much of RMSE is bias: the root mean square of the channels' biases over RMSE, NaN where there is no error.
+
+    From 0 to 1: RMSE² is the mean over channels of bias² + the variance of the error over the picture. At a half, a
+    quarter of the squared error is one and the same offset everywhere.
+    """
+    bias = math.hypot(row.bias_red, row.bias_green, row.bias_blue) / math.sqrt(3.0)
+    return bias / row.rmse if row.rmse > 0.0 else math.nan
+
+
+def _flattening(rows: Sequence[Row]) -> str:
+    """Why more samples do not help, where that is so.
+
+    Where the most samples of our series leave at least `FLAT` of the fewest's FLIP, and bias is at least `BIASED` of
+    their RMSE (`bias_share`); noise cannot be what is left there.
+    """
+    series = [row for row in rows if is_ours(row) and row.series == SAMPLES]
+    counts = {int(row.settings["samples"]): row for row in series if row.settings.get("samples", "").isdigit()}
+    if len(counts) < 2:
+        return ""
+    few, many = min(counts), max(counts)
+    first, last = counts[few], counts[many]
+    if not (last.flip >= FLAT * first.flip and bias_share(last) >= BIASED):
+        return ""
+    bias = zip(("red", "green", "blue"), (last.bias_red, last.bias_green, last.bias_blue), strict=True)
+    return (
+        f"From {few} to {many} samples Deep G-Buffer's FLIP {_course(first.flip, last.flip)}: a large "
+        f"part of what is left is bias ({', '.join(f'{name} {signed(value)}' for name, value in bias)}), which more "
+        "samples do not remove."
+    )
+
+
+def _course(first: float, last: float) -> str:
+    """How a figure goes from `first` to `last`."""
+    if number(first) == number(last):
+        return f"stays {number(last)}"
+    return f"{'rises' if last > first else 'falls only'} from {number(first)} to {number(last)}"
 
 
 def _below_noise(rows: Sequence[Row], noise: float) -> str:
@@ -82,12 +136,31 @@ def _below_noise(rows: Sequence[Row], noise: float) -> str:
 
 
 def _same_pictures(rows: Sequence[Row]) -> str:
-    """How many points are the same picture again."""
+    """How many points are the same picture again, and how far times of one picture differ."""
     count = sum(bool(row.same_picture_as) for row in rows)
     if not count:
         return ""
     verb = "point is" if count == 1 else "points are"
-    return f"{count} of {len(rows)} {verb} bit for bit the picture of another."
+    return f"{count} of {len(rows)} {verb} bit for bit the picture of another.{_same_times(rows)}"
+
+
+def _same_times(rows: Sequence[Row]) -> str:
+    """Warm seconds of the largest group of points with bit for bit the same picture and equally many samples.
+
+    Points that were not timed do not count; of equally large groups the first. "" where no group has two points.
+    """
+    groups: dict[tuple[str, str | None], list[float]] = {}
+    for row in rows:
+        if row.warm_renders:
+            samples = row.settings.get(ENGINES[row.engine].samples)
+            groups.setdefault((row.same_picture_as or row.name, samples), []).append(row.warm_s)
+    times = max(groups.values(), key=len, default=[])
+    if len(times) < 2:
+        return ""
+    return (
+        f" {len(times)} points with one picture and equally many samples took {seconds(min(times))} to "
+        f"{seconds(max(times))} s: differences in time as small as that say little about settings."
+    )
 
 
 def _point(row: Row) -> str:

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
+from addon.report.sweep import OURS
 from tooling.report.commands import repeat
 from tooling.report.results import Measurement, Report, SceneReport, Spread
 
@@ -71,6 +72,11 @@ class Row:
     def name(self) -> str:
         """Series and label, as people say it."""
         return named(self.series, self.label)
+
+    @property
+    def title(self) -> str:
+        """Its name with that of our engine before it; the other engines' series are called after them."""
+        return f"Deep G-Buffer · {self.name}" if self.engine == OURS else self.name
 
 
 def named(series: str, label: str) -> str:

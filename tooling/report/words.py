@@ -8,10 +8,22 @@ from tooling.report.results import SceneReport
 from tooling.report.summary import is_ours
 from tooling.report.tables import Row
 
+SOFTWARE = ("llvmpipe", "softpipe", "swrast")
+"""What OpenGL calls Mesa's drivers that draw on the processor."""
 SAME_PICTURES = (
-    "Points with the same picture differ in settings that change nothing in this scene; the list of what was left out "
-    "says why."
+    "Points with the same picture differ in settings that change nothing in this scene; the list of skipped work says "
+    "why."
 )
+
+
+def machine(told: str) -> str:
+    """The machine, of which `told` names the OpenGL device too, with what it means where that is the processor."""
+    if not any(driver in told.lower() for driver in SOFTWARE):
+        return told
+    return (
+        f"{told} (OpenGL on the processor, no graphics card: on one, EEVEE, Workbench and Deep G-Buffer take other "
+        "times)"
+    )
 
 
 def subject(scene: SceneReport) -> str:
