@@ -78,13 +78,20 @@ def settings() -> list[str]:
     ]
 
 
-def left() -> dict[str, object]:
-    """What there is of comparisons: folders, images, exit codes of all processes so far (None: it still runs)."""
+def left(temporary: str) -> dict[str, object]:
+    """What there is of comparisons in Blender's temporary folder, and exit codes of all processes so far (None: it
+    still runs). Reads nothing of Blender, whose data is gone when Python ends.
+    """
     return {
-        "folders": len(list(Path(bpy.app.tempdir).glob("comparison_*"))),
-        "images": sorted(image.name for image in bpy.data.images if image.name.startswith("Comparison")),
+        "folders": len(list(Path(temporary).glob("comparison_*"))),
         "processes": [child.returncode for child in children],
     }
+
+
+def left_in_the_file() -> dict[str, object]:
+    """The same, and the names of images."""
+    images = sorted(image.name for image in bpy.data.images if image.name.startswith("Comparison"))
+    return {**left(bpy.app.tempdir), "images": images}
 
 
 def recent_files() -> list[str]:
@@ -131,7 +138,7 @@ def cancelled(scene) -> Iterator[None]:
     yield from wait(ended)
     yield from frames(10)
     screenshot("cancelled")
-    results["cancelled"] = left()
+    results["cancelled"] = left_in_the_file()
     results["unchanged_after_cancelling"] = settings() == before
     scene.deep_gbuffer.samples = 4
 
@@ -149,7 +156,7 @@ def finished(scene) -> Iterator[None]:
         screenshot(name)
         shown = editors()
         results[name] = {
-            **left(),
+            **left_in_the_file(),
             "windows": len(bpy.context.window_manager.windows),
             "shown": [space.image.name for space in shown],
             "sizes": [tuple(space.image.size) for space in shown],
@@ -181,7 +188,7 @@ def undone() -> Iterator[None]:
     screenshot("undone")
     results["undone"] = {
         "samples": bpy.context.scene.deep_gbuffer.samples,
-        "images": left()["images"],
+        "images": left_in_the_file()["images"],
         "shown": [space.image.name if space.image else None for space in editors()],
     }
 
@@ -193,7 +200,7 @@ def another_file() -> Iterator[None]:
     yield from wait(rendering)
     bpy.ops.wm.read_homefile()
     yield from frames(10)
-    results["loaded"] = left()
+    results["loaded"] = left_in_the_file()
 
 
 def leave() -> Iterator[None]:
@@ -203,8 +210,10 @@ def leave() -> Iterator[None]:
     start(4, 20)
     yield from wait(rendering)
 
+    temporary = bpy.app.tempdir
+
     def gone() -> None:
-        results["quit"] = left()
+        results["quit"] = left(temporary)
         write()
 
     atexit.register(gone)

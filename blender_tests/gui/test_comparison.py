@@ -113,4 +113,5 @@ def test_the_numbers_are_those_of_two_engines_that_agree(comparison):
 @pytest.mark.parametrize(("way", "count"), [("loaded", 4), ("quit", 5)])
 def test_loading_a_file_or_quitting_ends_it(comparison, way, count):
     found = comparison.results[way]
-    assert found == {"folders": 0, "images": [], "processes": [INTERRUPTED, 0, 0, INTERRUPTED, INTERRUPTED][:count]}
+    assert found.pop("images", []) == []
+    assert found == {"folders": 0, "processes": [INTERRUPTED, 0, 0, INTERRUPTED, INTERRUPTED][:count]}
