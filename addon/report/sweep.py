@@ -85,6 +85,8 @@ NO_FILES = {"save_layers": "False", "save_deep": "False", "save_snapshot": "Fals
 """What is measured is the picture, and files of the scene's own must not be written again."""
 
 PICTURE = {**NO_FILES, "debug_view": "NONE", "time_limit": "0"}
+"""Nothing of the file's own shows something else, writes files or stops early."""
+
 STRUCTURE = {**PICTURE, "samples": "4"}
 """What the axes other than the number of samples are measured with."""
 

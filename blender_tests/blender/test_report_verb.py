@@ -8,8 +8,6 @@ from pathlib import Path
 import bpy
 import pytest
 
-pytest.importorskip("flip_evaluator")
-
 from addon.report.reference import REFERENCE_SETTINGS
 from addon.report.sweep import Point
 from tooling import environments

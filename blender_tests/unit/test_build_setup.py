@@ -3,6 +3,7 @@
 
 import re
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -168,7 +169,6 @@ def test_the_mirror_is_read_from_apts_sources(tmp_path, name, text, address):
 
 
 def test_the_manifest_lists_platforms_and_wheels_before_its_tables():
-    tomllib = pytest.importorskip("tomllib")
     text = (packaging.ADD_ON / "blender_manifest.toml").read_text(encoding="utf-8")
     manifest = tomllib.loads(packaging.complete_manifest(text, ["linux-x64"], ["b.whl", "a.whl"]))
     assert manifest["platforms"] == ["linux-x64"]

@@ -194,6 +194,13 @@ def test_a_point_that_fails_is_one_problem_and_the_others_go_on(options, capfd):
     assert capfd.readouterr().err.count("out of memory") == 1
 
 
+def test_pictures_that_do_not_fit_their_reference_are_a_problem(options):
+    stand = Stand()
+    stand.judge_trouble = ValueError("the picture is 8×8×3 and its reference 4×4×3")
+    (problem,) = make(options, [FAST], stand)
+    assert problem == "room · Samples: 1 spp is left out: the picture is 8×8×3 and its reference 4×4×3."
+
+
 def test_a_missing_engine_is_one_problem_and_tried_once(options, tmp_path):
     stand = Stand()
     tried = []

@@ -5,24 +5,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from addon.report.sweep import OURS, Point
+from addon.report.sweep import OURS, PICTURE, Point
 from tooling.console import ToolError
 from tooling.report import blender, device, judging, page, references
 from tooling.report.interfaces import Rendered, Working
 from tooling.report.plan import Look
-from tooling.report.results import Judgement, Reference, Report, Run, Subject
+from tooling.report.results import Reference, Run, Subject
 
 LAYERS_FILE = "layers.exr"
 """How the names of our layer files end."""
 
-MOTION = {
-    "samples": "1",
-    "time_limit": "0",
-    "save_layers": "True",
-    "save_motion": "True",
-    "save_deep": "False",
-    "save_snapshot": "False",
-}
+MOTION = {**PICTURE, "samples": "1", "save_layers": "True", "save_motion": "True"}
 """Settings of ours that write depth and motion."""
 
 
@@ -78,31 +71,9 @@ class BlenderInstruments:
         )
         return found[0]
 
-    def judge(
-        self,
-        pictures: Sequence[Path],
-        reference: Reference,
-        subject: Subject,
-        layers: Sequence[Path] | None,
-        folder: Path,
-        name: str,
-    ) -> Judgement:
-        """Errors, FLIP and flicker."""
-        try:
-            return judging.judge(pictures, reference, subject, layers, folder, name)
-        except ValueError as error:
-            raise ToolError(f"{error}.") from error
-
-    def reference_flicker(self, reference: Reference, subject: Subject, layers: Sequence[Path]) -> float | None:
-        """Flicker of the reference's own frames."""
-        try:
-            return judging.reference_flicker(reference, subject, layers)
-        except ValueError as error:
-            raise ToolError(f"{error}.") from error
-
-    def write(self, report: Report, folder: Path) -> None:
-        """Write the page."""
-        page.write(report, folder)
+    judge = staticmethod(judging.judge)
+    reference_flicker = staticmethod(judging.reference_flicker)
+    write = staticmethod(page.write)
 
 
 def one_of_each(files: Sequence[Path], frames: int) -> tuple[Path, ...]:

@@ -81,11 +81,11 @@ class Instruments(Protocol):
         folder: Path,
         name: str,
     ) -> Judgement:
-        """Compare pictures with the reference; PNG files go to `folder`."""
+        """Compare pictures with the reference; PNG files go to `folder`. ValueError, too, where they do not fit."""
         ...
 
     def reference_flicker(self, reference: Reference, subject: Subject, layers: Sequence[Path]) -> float | None:
-        """Flicker of the reference's own frames; None where nothing can be followed."""
+        """Flicker of the reference's own frames; None where nothing can be followed. ValueError as in `judge`."""
         ...
 
     def write(self, report: Report, folder: Path) -> None:

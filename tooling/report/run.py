@@ -3,8 +3,8 @@
 
 import tempfile
 import time
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from datetime import date
 from pathlib import Path
@@ -34,6 +34,16 @@ class Scene:
     is_followed: bool = True
     problems: list[str] = field(default_factory=list[str])
     hopeless: list[Point] = field(default_factory=list[Point])
+
+
+@contextmanager
+def judging(folder: Path) -> Iterator[None]:
+    """Turns what is wrong with pictures into a ToolError, and what the file system refuses as `writing` does."""
+    try:
+        with writing(folder):
+            yield
+    except ValueError as error:
+        raise ToolError(f"{error}.") from error
 
 
 def make(options: Options, points: Sequence[Point], instruments: Instruments) -> list[str]:
@@ -125,7 +135,7 @@ class Work:
         self._lines.prepare(f"{subject.name}: motion")
         try:
             layers = self._instruments.layers(subject, folder, self._lines.working)
-            with writing(folder):
+            with judging(folder):
                 flicker = self._instruments.reference_flicker(scene.reference, subject, layers)
         except WriteError:
             raise
@@ -206,7 +216,7 @@ class Work:
         """Judge a point's pictures and keep that."""
         name = self._picture_name(scene, point)
         folder = self._store.pictures
-        with writing(folder):
+        with judging(folder):
             judgement = self._instruments.judge(pictures, scene.reference, scene.subject, scene.layers, folder, name)
         self._store.keep_judgement(name, scene.subject, point, judgement)
         return judgement
