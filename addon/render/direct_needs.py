@@ -34,13 +34,17 @@ def direct_needs(scene: Scene, settings: RenderSettings, lights: LightPlan) -> d
     world, materials = scene.world, scene.materials.values()
     linked = any(light.receiver_groups != ALL_GROUPS for light in lights.lights)
     physical = settings.shading_model is ShadingModel.PHYSICAL
+    shines, dark = world.shines, "the world is black or lights nothing"
+    if lights.world_gathered:
+        shines = world.seen_by_glossy and any(material.is_glossy for material in materials)
+        dark = "the indirect method finds the world's diffuse light, and nothing is glossy"
     needed = {
         "SUN_LIGHTS": (LightKind.SUN in kinds, "no sun"),
         "AREA_LIGHTS": (LightKind.AREA in kinds, "no area light"),
         "SPHERE_LIGHTS": (False in bulbs, "no point or spot light without soft falloff"),
         "DISK_LIGHTS": (True in bulbs, "no point or spot light with soft falloff"),
         "MESH_LIGHTS": (bool(lights.mesh_lights), "no emissive surface is sampled as a light"),
-        "WORLD_LIGHTS": (lights.world_directions > 0, "the world is black or lights nothing"),
+        "WORLD_LIGHTS": (lights.world_directions > 0, dark),
         "SPOT_CONES": (LightKind.SPOT in kinds, "no spot light"),
         "SPECULAR": (any(material.is_glossy for material in materials), "no glossy material"),
         "DIFFUSE_ROUGHNESS": (
@@ -48,8 +52,8 @@ def direct_needs(scene: Scene, settings: RenderSettings, lights: LightPlan) -> d
             "no material has diffuse roughness, or Phong shading knows none",
         ),
         "PHONG": (not physical, "shading is not Phong's"),
-        "WORLD": (world.shines, "the world is black or lights nothing"),
-        "ENVIRONMENT": (world.shines and world.environment is not None, "the world has one colour"),
+        "WORLD": (shines, dark),
+        "ENVIRONMENT": (shines and world.environment is not None, "the world has one colour"),
         "EMISSION": (any(material.is_emissive for material in materials), "no emissive material"),
         "SHADOWS": (lights.casts_shadows, "no light casts a shadow, or nothing is in its way"),
         "LINKING": (linked, "every light shines on everything"),

@@ -22,6 +22,7 @@ CHANNEL_COMPONENTS = {
     Channel.GLOSSY_DIRECT: 3,
     Channel.EMISSION: 3,
     Channel.ENVIRONMENT: 3,
+    Channel.DIFFUSE_INDIRECT: 3,
 }
 
 
@@ -33,13 +34,17 @@ class Film:
         self.samples = 0
         self._summed = 0
 
-    def begin_sample(self, framebuffer: moderngl.Framebuffer, *, over: bool = False) -> None:
-        """Bind the sums for adding one sample; the first one clears them, and any that starts `over`."""
-        framebuffer.use()
+    def begin_sample(self, *, over: bool = False) -> None:
+        """Go on to a sample; the first one clears the sums, and any that starts `over`."""
         if self.samples == 0 or over:
-            framebuffer.clear()
             self._summed = 0
         self._summed += 1
+
+    def bind(self, framebuffer: moderngl.Framebuffer) -> None:
+        """Bind some of the sums, so that what is drawn is added to them."""
+        framebuffer.use()
+        if self._summed == 1:
+            framebuffer.clear()
         self._context.enable_only(moderngl.BLEND)
         self._context.blend_func = moderngl.ONE, moderngl.ONE
 

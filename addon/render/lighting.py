@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The lights of one view on the GPU: what they are, and which point of each the current sample uses."""
 
+from dataclasses import replace
 from math import inf
 
 import moderngl
@@ -55,7 +56,8 @@ class Lighting:
 
     def begin(self, scene: Scene, settings: RenderSettings, planned: LightPlan, origin: Float64Array) -> None:
         """The lights of a view whose camera is at `origin` (3,)."""
-        self.plan, self._settings, self._world, self._origin = planned, settings, scene.world, origin
+        self.plan, self._settings, self._origin = planned, settings, origin
+        self._world = replace(scene.world, seen_by_diffuse=scene.world.seen_by_diffuse and not planned.world_gathered)
         if planned.world_directions and self._sampled_world is not scene.world:
             self._world_sampler, self._sampled_world = WorldSampler(scene.world), scene.world
         self._rows = np.concatenate([light_rows(planned.lights, origin), mesh_light_rows(planned.mesh_lights)])
@@ -93,6 +95,11 @@ class Lighting:
         if self.plan.world_directions:
             rows = np.concatenate([rows, self._world_rows(sample)])
         self._table = self._uploaded(self._table, as_texels(rows))
+
+    @property
+    def world_factors(self) -> tuple[float, float]:
+        """On what the world causes by diffuse and by glossy reflection."""
+        return float(self._world.seen_by_diffuse), float(self._world.seen_by_glossy)
 
     @property
     def point_spacing(self) -> float:

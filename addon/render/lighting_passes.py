@@ -3,6 +3,7 @@
 
 from ..scene import Channel, DebugView, RenderSettings, Scene, ShadingModel
 from .direct_needs import DIRECT_DEFINES, GOURAUD_DEFINES, direct_needs
+from .indirect_plan import INDIRECT_DEBUG_VIEWS
 from .layout import TargetSpec, depth_tiles_target, light_tiles_target
 from .light_reach import MANY_LIGHTS
 from .lighting_plan import LightPlan
@@ -19,27 +20,36 @@ _PER_VERTEX = (
 )
 
 
+SHADING_PASSES = ("direct", "gouraud")
+"""The passes that light what is seen."""
+
+
 def plan_lighting_passes(
-    scene: Scene, settings: RenderSettings, lights: LightPlan, layers: int, left_out: list[LeftOut]
+    scene: Scene, settings: RenderSettings, lights: LightPlan, layers: int, left_out: list[LeftOut], *, tiled: bool
 ) -> tuple[PlannedPass, ...]:
-    """Tiles, shadow maps and shading of `layers` layers, in order; what shades is the last. None where nothing does."""
+    """Tiles, shadow maps and shading of `layers` layers, in order; what shades is the last, where anything does.
+
+    `tiled`: whether another pass reads the tiles' depths.
+    """
     gouraud = settings.shading_model is ShadingModel.GOURAUD
     shading = _plan_shading(scene, settings, lights, layers, left_out, gouraud=gouraud)
     if shading is None:
-        left_out += [LeftOut(name, "no direct light") for name in ("depth_tiles", "shadow_maps", "light_tiles")]
-        return ()
+        dark = ("shadow_maps", "light_tiles") if tiled else ("depth_tiles", "shadow_maps", "light_tiles")
+        left_out += [LeftOut(name, "no direct light") for name in dark]
+        return _plan_depth_tiles(layers) if tiled else ()
     if gouraud:
         left_out += _PER_VERTEX
         return (shading,)
     left_out.append(LeftOut("gouraud", "shading is not Gouraud's"))
-    tiles = _plan_depth_tiles(lights, layers, left_out)
+    if tiled or lights.casts_shadows or lights.many:
+        tiles = _plan_depth_tiles(layers)
+    else:
+        left_out.append(LeftOut("depth_tiles", f"no shadows, and no more than {MANY_LIGHTS} lamps"))
+        tiles = ()
     return (*tiles, *_plan_shadow_maps(lights, left_out), *_plan_light_tiles(lights, layers, left_out), shading)
 
 
-def _plan_depth_tiles(lights: LightPlan, layers: int, left_out: list[LeftOut]) -> tuple[PlannedPass, ...]:
-    if not (lights.casts_shadows or lights.many):
-        left_out.append(LeftOut("depth_tiles", f"no shadows, and no more than {MANY_LIGHTS} lamps"))
-        return ()
+def _plan_depth_tiles(layers: int) -> tuple[PlannedPass, ...]:
     return (PlannedPass("depth_tiles", reads=("gbuffer.view_depth",), writes=(depth_tiles_target(layers),)),)
 
 
@@ -74,7 +84,8 @@ def _plan_shading(
     if not lit and not emissive:
         left_out.append(LeftOut("direct", "no light, emission or world"))
         return None
-    if settings.debug_view not in (DebugView.NONE, DebugView.DIRECT) and not settings.deep_output:
+    shows_light = settings.debug_view in INDIRECT_DEBUG_VIEWS | {DebugView.NONE, DebugView.DIRECT}
+    if not shows_light and not settings.deep_output:
         left_out.append(LeftOut("direct", "the debug view shows the G-buffer only"))
         return None
     name, known = ("gouraud", GOURAUD_DEFINES) if gouraud else ("direct", DIRECT_DEFINES)

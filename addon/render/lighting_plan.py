@@ -22,6 +22,7 @@ class LightPlan:
     `lights`, `mesh_lights`: sampled every sample. `reach` (m) of each of `lights`: beyond it one is only sampled now
     and then. `world_directions`: from how many directions the world lights each sample. `preview`: whether the first
     sample shows lights by closed forms and their shadows from their centres. `casts_shadows`: whether anything does.
+    `world_gathered`: whether the world's diffuse light is left to the indirect method.
     """
 
     lights: tuple[Light, ...] = ()
@@ -30,6 +31,7 @@ class LightPlan:
     world_directions: int = 0
     preview: bool = False
     casts_shadows: bool = False
+    world_gathered: bool = False
 
     @property
     def count(self) -> int:
@@ -43,10 +45,17 @@ class LightPlan:
 
 
 def plan_lights(
-    scene: Scene, settings: RenderSettings, camera: Camera | None, memory: Memory, *, continuous: bool
+    scene: Scene,
+    settings: RenderSettings,
+    camera: Camera | None,
+    memory: Memory,
+    *,
+    continuous: bool,
+    world_gathered: bool = False,
 ) -> tuple[LightPlan, list[tuple[str, str]]]:
     """The lights of a picture, and (name, reason) of what is left out.
 
+    `world_gathered`: only what reflects otherwise than diffusely needs the world's light.
     `memory` of earlier pictures afterwards holds what this one is made of.
     """
     left_out: list[tuple[str, str]] = []
@@ -55,7 +64,7 @@ def plan_lights(
     memory.forget_unused()
     left_out += [(f"light of {light.name}", _NOT_WORTH_IT) for light in dim]
     left_out += _unsampled_emission(scene)
-    casts = any(light.casts_shadow for light in lights) or bool(surfaces) or scene.world.shines
+    casts = any(light.casts_shadow for light in lights) or bool(surfaces) or _samples_world(scene, world_gathered)
     casters = any(batch.casts_shadow for batch in scene.batches)
     intensities = np.array([peak_intensity(light) for light in lights])
     extents = np.array([extent(light) for light in lights])
@@ -64,11 +73,18 @@ def plan_lights(
         lights,
         surfaces,
         tuple(float(distance) for distance in reach),
-        settings.world_directions if scene.world.shines else 0,
+        settings.world_directions if _samples_world(scene, world_gathered) else 0,
         preview=continuous or settings.samples == 1,
         casts_shadows=casts and casters,
+        world_gathered=world_gathered,
     )
     return planned, left_out
+
+
+def _samples_world(scene: Scene, gathered: bool) -> bool:
+    if not gathered:
+        return scene.world.shines
+    return scene.world.shines and scene.world.seen_by_glossy and any(m.is_glossy for m in scene.materials.values())
 
 
 def _unsampled_emission(scene: Scene) -> list[tuple[str, str]]:

@@ -1,13 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which passes a scene needs, and why the others are left out. Pure: no OpenGL, no Blender."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import inf
 
 from ..scene import Camera, Channel, DebugView, RenderSettings, Scene, ShadingModel, Variant
+from .indirect_plan import (
+    INDIRECT_DEBUG_VIEWS,
+    INDIRECT_PASSES,
+    IRRADIANCE_TARGET,
+    ORIGIN_TARGET,
+    IndirectNeeds,
+    indirect_needs,
+    plan_indirect,
+    reads_layers,
+)
 from .layout import CHANNELS, EXIT_CHANNELS, GBufferChannel, TargetSpec
-from .lighting_passes import SPLIT_TARGETS, plan_lighting_passes
+from .lighting_passes import SHADING_PASSES, SPLIT_TARGETS, plan_lighting_passes
 from .lighting_plan import LightPlan, plan_lights
 from .memory import Memory
 from .planned_pass import LeftOut, PlannedPass
@@ -19,7 +29,8 @@ class Plan:
 
     `layers`: how many are built, by `variant`, which is TWO_PASS for a single one. `channels`: those that somebody
     reads, each with how many layers of it, the nearest first. `look_ahead`: whether an extra layer shows the next
-    picture's depth. `guard_band`: pixels around the picture, on each side. `lights`: what lights it.
+    picture's depth. `guard_band`: pixels around the picture, on each side. `lights`: what lights it. `indirect`: what
+    its indirect light needs.
     """
 
     passes: tuple[PlannedPass, ...]
@@ -30,6 +41,7 @@ class Plan:
     look_ahead: bool
     guard_band: int
     lights: LightPlan
+    indirect: IndirectNeeds
 
     @property
     def one_pass(self) -> bool:
@@ -78,6 +90,11 @@ _DEBUG_TARGETS = {
     DebugView.EXIT_DEPTH: "exit.view_depth",
     DebugView.EXIT_NORMAL: "exit.normal",
     DebugView.EXIT_ALBEDO: "exit.base_color",
+    DebugView.INDIRECT: IRRADIANCE_TARGET,
+    DebugView.GRID_CELLS: ORIGIN_TARGET,
+    DebugView.GRID_RADIANCE: ORIGIN_TARGET,
+    DebugView.MARCH_HITS: ORIGIN_TARGET,
+    DebugView.LIGHT_ORIGIN: ORIGIN_TARGET,
 }
 
 _FILM_CHANNELS = {
@@ -91,6 +108,7 @@ _FILM_CHANNELS = {
     Channel.GLOSSY_DIRECT: {"view_depth"},
     Channel.EMISSION: {"view_depth", "emission"},
     Channel.ENVIRONMENT: {"view_depth"},
+    Channel.DIFFUSE_INDIRECT: {"view_depth", "normal", "base_color", "material"},
 }
 
 
@@ -107,16 +125,20 @@ def plan(
     `continuous` as in `Sequence`. `memory` of earlier plans makes this one faster.
     """
     left_out: list[LeftOut] = []
-    layers = _layer_count(settings, left_out)
+    indirect = indirect_needs(scene, settings, left_out)
+    layers = _layer_count(settings, indirect, left_out)
     variant = settings.variant if layers > 1 else Variant.TWO_PASS
     look_ahead = _looks_ahead(variant, settings, continuous=continuous)
-    guard_band = _plan_guard_band(settings, variant, left_out)
+    guard_band = _plan_guard_band(settings, variant, indirect, left_out)
     view = camera and guarded(camera, settings, guard_band)
-    lights, dark = plan_lights(scene, settings, view, memory or Memory(), continuous=continuous)
+    lights, dark = plan_lights(
+        scene, settings, view, memory or Memory(), continuous=continuous, world_gathered=indirect.world_gathered
+    )
     left_out += [LeftOut(name, reason) for name, reason in dark]
-    lighting = plan_lighting_passes(scene, settings, lights, layers, left_out)
-    direct = lighting[-1] if lighting else None
-    channels = _read_channels(scene, settings, direct, layers, left_out)
+    lighting = plan_lighting_passes(scene, settings, lights, layers, left_out, tiled=indirect.reads_grid)
+    direct = next((planned for planned in lighting if planned.name in SHADING_PASSES), None)
+    bounced = plan_indirect(scene, settings, indirect, left_out, direct=direct, continuous=continuous)
+    channels = _read_channels(scene, settings, [*lighting, *bounced], layers, left_out)
     one_pass = variant is not Variant.TWO_PASS
     drawn_layers = layers + look_ahead if one_pass else layers
     gbuffer = PlannedPass(
@@ -131,11 +153,12 @@ def plan(
     passes = [
         *_plan_oracle(variant, layers, left_out, continuous=continuous),
         gbuffer,
-        *_plan_exit(settings, drawn_layers, left_out),
+        *_plan_exit(settings, indirect, drawn_layers, left_out),
         *lighting,
-        _plan_composite(scene, settings, direct),
+        *bounced,
+        _plan_composite(scene, settings, direct, indirect, bounced),
     ]
-    return Plan(tuple(passes), tuple(left_out), layers, variant, channels, look_ahead, guard_band, lights)
+    return Plan(tuple(passes), tuple(left_out), layers, variant, channels, look_ahead, guard_band, lights, indirect)
 
 
 def guarded(camera: Camera, settings: RenderSettings, guard_band: int) -> Camera:
@@ -148,7 +171,8 @@ def guarded(camera: Camera, settings: RenderSettings, guard_band: int) -> Camera
 
 def frames_before(settings: RenderSettings) -> int:
     """How many frames before the rendered one the settings need (`Sequence.previous`, then `Sequence.earlier`)."""
-    if _layer_count(settings, []) > 1:
+    several = settings.layers if reads_layers(settings.indirect) else _layer_count(settings, IndirectNeeds(), [])
+    if several > 1:
         if settings.variant is Variant.PREDICT:
             return 2
         if settings.variant in (Variant.PREVIOUS, Variant.REPROJECT):
@@ -157,11 +181,11 @@ def frames_before(settings: RenderSettings) -> int:
     return 1 if reads_motion else 0
 
 
-def _layer_count(settings: RenderSettings, left_out: list[LeftOut]) -> int:
+def _layer_count(settings: RenderSettings, indirect: IndirectNeeds, left_out: list[LeftOut]) -> int:
     if settings.deep_output:
         return settings.layers
-    needed = 1
-    if settings.debug_view is not DebugView.NONE:
+    needed = indirect.layers
+    if settings.debug_view not in INDIRECT_DEBUG_VIEWS | {DebugView.NONE}:
         needed = min(settings.debug_layer, settings.layers - 1) + 1
     if needed < settings.layers:
         unread = f"layer {needed + 1}" if needed + 1 == settings.layers else f"layers {needed + 1}–{settings.layers}"
@@ -212,8 +236,10 @@ def reads_past_the_edge(variant: Variant) -> bool:
     return variant is Variant.REPROJECT
 
 
-def _plan_guard_band(settings: RenderSettings, variant: Variant, left_out: list[LeftOut]) -> int:
-    if settings.guard_band == 0 or reads_past_the_edge(variant):
+def _plan_guard_band(
+    settings: RenderSettings, variant: Variant, indirect: IndirectNeeds, left_out: list[LeftOut]
+) -> int:
+    if settings.guard_band == 0 or reads_past_the_edge(variant) or indirect.any:
         return settings.guard_band
     reason = "nothing reads beyond the picture's edge: no screen-space effect, no layers that are reprojected"
     left_out.append(LeftOut("guard band", reason))
@@ -229,8 +255,10 @@ def _reads_exit(settings: RenderSettings) -> bool:
     return (settings.deep_output and settings.exit_surfaces) or _debug_target(settings).startswith("exit.")
 
 
-def _plan_exit(settings: RenderSettings, layers: int, left_out: list[LeftOut]) -> tuple[PlannedPass, ...]:
-    if not _reads_exit(settings):
+def _plan_exit(
+    settings: RenderSettings, indirect: IndirectNeeds, layers: int, left_out: list[LeftOut]
+) -> tuple[PlannedPass, ...]:
+    if not (_reads_exit(settings) or indirect.exit):
         left_out.append(LeftOut("exit", "no effect, output or debug view reads the exit surfaces"))
         return ()
     writes = tuple(channel.target(layers) for channel in EXIT_CHANNELS)
@@ -238,7 +266,11 @@ def _plan_exit(settings: RenderSettings, layers: int, left_out: list[LeftOut]) -
 
 
 def _read_channels(
-    scene: Scene, settings: RenderSettings, direct: PlannedPass | None, layers: int, left_out: list[LeftOut]
+    scene: Scene,
+    settings: RenderSettings,
+    passes: Sequence[PlannedPass],
+    layers: int,
+    left_out: list[LeftOut],
 ) -> tuple[tuple[GBufferChannel, int], ...]:
     """The channels that somebody reads, each with how many layers of it."""
     read = {"view_depth": layers}
@@ -247,8 +279,10 @@ def _read_channels(
         for name in names:
             read[name] = max(read.get(name, 0), count)
 
-    if direct:
-        add((name.removeprefix("gbuffer.") for name in direct.reads if name.startswith("gbuffer.")), layers)
+    for planned in passes:
+        add((name.removeprefix("gbuffer.") for name in planned.reads if name.startswith("gbuffer.")), layers)
+    if any(planned.name in INDIRECT_PASSES for planned in passes):
+        add(("base_color", "material"), 1)  # what the composite multiplies irradiance by
     for channel in settings.channels:
         add(_FILM_CHANNELS.get(channel, ()), 1)
     if _debug_target(settings).startswith("gbuffer."):
@@ -268,17 +302,29 @@ def _read_channels(
     return tuple((channel, read[channel.name]) for channel in CHANNELS if channel.name in read)
 
 
-def _plan_composite(scene: Scene, settings: RenderSettings, direct: PlannedPass | None) -> PlannedPass:
+def _plan_composite(
+    scene: Scene,
+    settings: RenderSettings,
+    direct: PlannedPass | None,
+    indirect: IndirectNeeds,
+    bounced: tuple[PlannedPass, ...],
+) -> PlannedPass:
     defines: set[str] = set()
+    written = {target.name for planned in bounced for target in planned.writes}
+    if indirect.any and (settings.debug_view is DebugView.NONE or Channel.DIFFUSE_INDIRECT in settings.channels):
+        defines.add("INDIRECT")
     if settings.debug_view is DebugView.NONE:
         defines |= {"DIRECT"} if direct else set[str]()
+        defines |= {"ADD_INDIRECT"} if indirect.any else set[str]()
     else:
         defines.add(f"DEBUG_{settings.debug_view.value}")
         if settings.debug_view is DebugView.DIRECT and not direct:
             defines.remove("DEBUG_DIRECT")
+        if settings.debug_view in INDIRECT_DEBUG_VIEWS and _debug_target(settings) not in written:
+            defines.remove(f"DEBUG_{settings.debug_view.value}")
     defines |= {f"FILM_{channel.value}" for channel in settings.channels & MEAN_CHANNELS}
     materials = scene.materials.values()
-    if settings.channels & {Channel.DIFFUSE_COLOR, Channel.GLOSSY_COLOR}:
+    if settings.channels & {Channel.DIFFUSE_COLOR, Channel.GLOSSY_COLOR} or "INDIRECT" in defines:
         defines |= {"SPECULAR"} if any(material.is_glossy for material in materials) else set[str]()
         rough = any(material.diffuse_roughness > 0.0 for material in materials)
         defines |= {"DIFFUSE_ROUGHNESS"} if rough else set[str]()
@@ -288,13 +334,18 @@ def _plan_composite(scene: Scene, settings: RenderSettings, direct: PlannedPass 
         defines.add("SUN_DISC")
     defines |= {"SPLIT"} if direct and settings.channels & SPLIT_TARGETS.keys() else set[str]()
     reads = {"view_depth"}.union(*(_FILM_CHANNELS[channel] for channel in settings.channels & MEAN_CHANNELS))
+    if "INDIRECT" in defines:
+        reads |= {"normal", "base_color", "material"}
     targets = [f"gbuffer.{name}" for name in sorted(reads)]
     shown = [_debug_target(settings), *(["exit.view_depth"] if _debug_target(settings).startswith("exit.") else [])]
-    targets += [name for name in dict.fromkeys(shown) if name and name not in targets]
+    shown = [name for name in shown if name and (name in written or not name.startswith("indirect."))]
+    targets += [name for name in dict.fromkeys(shown) if name not in targets]
     if defines & {"DIRECT", "DEBUG_DIRECT"}:
         targets.append("direct.radiance")
     if "SPLIT" in defines:
         targets += SPLIT_TARGETS.values()
+    if "INDIRECT" in defines and IRRADIANCE_TARGET not in targets:
+        targets.append(IRRADIANCE_TARGET)
     writes = tuple(
         film_target(channel) for channel in SUM_CHANNELS if channel in settings.channels | {Channel.COMBINED}
     )

@@ -7,6 +7,7 @@ thread while `sync` builds the next one. What changed between two scenes is told
 
 from .camera import Camera
 from .geometry import InstanceBatch, Mesh, SlotRange
+from .indirect import IndirectMethod, IndirectSettings
 from .lights import ALL_GROUPS, LINK_GROUPS, AreaShape, Light, LightKind
 from .materials import BaseColorSource, EmissionSampling, Extension, Image, ImageTexture, Interpolation, Material
 from .scene import EnvironmentMap, Scene, SunDisc, Versions, World
@@ -26,6 +27,8 @@ __all__ = [
     "Extension",
     "Image",
     "ImageTexture",
+    "IndirectMethod",
+    "IndirectSettings",
     "InstanceBatch",
     "Interpolation",
     "Layering",

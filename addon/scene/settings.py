@@ -4,6 +4,8 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
+from .indirect import DIRECT_ONLY, IndirectSettings
+
 
 class Channel(StrEnum):
     """Images the film can deliver; the engine's table of passes maps them to Blender's names.
@@ -12,7 +14,8 @@ class Channel(StrEnum):
     NORMAL: world-space shading normal, mean. POSITION: world-space position (m), sample 0.
     DIFFUSE_COLOR, GLOSSY_COLOR: diffuse and specular albedo, mean. OBJECT_INDEX: pass index of sample 0.
     DIFFUSE_DIRECT, GLOSSY_DIRECT: radiance that lamps and world cause by either reflection, mean; Blender's passes are
-    these over the colours. EMISSION: radiance that surfaces emit, mean. ENVIRONMENT: the world seen directly, mean.
+    these over the colours. DIFFUSE_INDIRECT: radiance that the indirect method finds, mean.
+    EMISSION: radiance that surfaces emit, mean. ENVIRONMENT: the world seen directly, mean.
     """
 
     COMBINED = "COMBINED"
@@ -26,10 +29,16 @@ class Channel(StrEnum):
     GLOSSY_DIRECT = "GLOSSY_DIRECT"
     EMISSION = "EMISSION"
     ENVIRONMENT = "ENVIRONMENT"
+    DIFFUSE_INDIRECT = "DIFFUSE_INDIRECT"
 
 
 class DebugView(StrEnum):
-    """What the picture shows instead of the composite: one channel of the deep G-buffer."""
+    """What the picture shows instead of the composite: one channel of the deep G-buffer, or what light is made of.
+
+    INDIRECT: irradiance over π. GRID_CELLS: the radiance grid's cells in colours of their own, GRID_RADIANCE: what they
+    send. MARCH_HITS: share of rays that met a layer. LIGHT_ORIGIN: share of irradiance from layers (red), grid (green)
+    and world (blue).
+    """
 
     NONE = "NONE"
     DEPTH = "DEPTH"
@@ -41,6 +50,11 @@ class DebugView(StrEnum):
     OBJECT_INDEX = "OBJECT_INDEX"
     DIRECT = "DIRECT"
     MOTION = "MOTION"
+    INDIRECT = "INDIRECT"
+    GRID_CELLS = "GRID_CELLS"
+    GRID_RADIANCE = "GRID_RADIANCE"
+    MARCH_HITS = "MARCH_HITS"
+    LIGHT_ORIGIN = "LIGHT_ORIGIN"
     EXIT_DEPTH = "EXIT_DEPTH"
     EXIT_NORMAL = "EXIT_NORMAL"
     EXIT_ALBEDO = "EXIT_ALBEDO"
@@ -113,6 +127,7 @@ class RenderSettings:
     `world_directions`: from how many directions the world lights each sample.
     `light_threshold` (W/(sr·m²)): radiance on a white surface below which one of many lights is sampled only now and
     then; 0 samples all always.
+    `indirect`: how light that was reflected before is found.
     """
 
     width: int
@@ -140,3 +155,4 @@ class RenderSettings:
     shadow_updates: int = 16
     world_directions: int = 8
     light_threshold: float = 0.01
+    indirect: IndirectSettings = DIRECT_ONLY

@@ -7,6 +7,7 @@
 // 2 square of how far the light reaches in this sample, and in every sample, m² · 1 where its point is always the same ·
 //   share of the light that the point stands for, 0 in a preview
 
+#include "common/basis.glsl"
 #include "common/constants.glsl"
 
 const int LIGHT_POINT = 0;
@@ -90,16 +91,6 @@ Light fetch_light(int index)
     vec4 row_5 = texelFetch(light_table, first + ivec2(5, 0), 0);
     return Light(int(row_0.w), row_0.xyz, row_1.xyz, row_1.w, row_2.rgb, row_2.w, row_3.w, row_3.xyz, row_4.xyz,
                  int(row_4.w) == SHAPE_ELLIPSE, row_5.x, row_5.y, row_5.z, row_5.w);
-}
-
-/** Two unit vectors perpendicular to n (Duff et al. 2017, "Building an Orthonormal Basis, Revisited"). */
-void orthonormal_basis(vec3 n, out vec3 tangent, out vec3 bitangent)
-{
-    float s = n.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + n.z);
-    float b = n.x * n.y * a;
-    tangent = vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x);
-    bitangent = vec3(b, s + n.y * n.y * a, -n.y);
 }
 
 /** The part of a vector across a unit axis. */

@@ -23,6 +23,8 @@ uniform sampler2DArray exit_base_color_layers;
 uniform sampler2DArray radiance_layers;
 uniform sampler2DArray diffuse_layers;
 uniform sampler2DArray glossy_layers;
+uniform sampler2DArray irradiance_layers;
+uniform sampler2DArray origin_layers;
 
 // Motion of this many pixels is shown with half of the greatest saturation.
 const float MOTION_SCALE = 8.0;
@@ -32,6 +34,19 @@ float depth_shade(float view_depth)
 {
     return isinf(view_depth) ? 1.0 : view_depth / (1.0 + view_depth);
 }
+
+#if defined(DEBUG_GRID_CELLS) || defined(DEBUG_GRID_RADIANCE) || defined(DEBUG_MARCH_HITS) || defined(DEBUG_LIGHT_ORIGIN)
+#define DEBUG_ORIGIN
+#endif
+
+#ifdef DEBUG_ORIGIN
+/** What the indirect method left to be shown at a pixel; a texel may be for several. */
+vec3 shown_origin(ivec2 pixel)
+{
+    ivec2 pixels_per_texel = ivec2(round(camera_resolution / vec2(textureSize(origin_layers, 0).xy)));
+    return texelFetch(origin_layers, ivec3(pixel / pixels_per_texel, 0), 0).rgb;
+}
+#endif
 
 #if defined(DEBUG_EXIT_NORMAL) || defined(DEBUG_EXIT_ALBEDO)
 /** Whether a layer has an exit surface at a texel. */
@@ -71,6 +86,10 @@ vec3 shown_color(ivec3 texel, float view_depth)
     return has_exit(texel) ? 0.5 * decode_octahedral(texelFetch(exit_normal_layers, texel, 0).rg) + 0.5 : vec3(0.0);
 #elif defined(DEBUG_EXIT_ALBEDO)
     return has_exit(texel) ? texelFetch(exit_base_color_layers, texel, 0).rgb : vec3(0.0);
+#elif defined(DEBUG_INDIRECT)
+    return texelFetch(irradiance_layers, ivec3(texel.xy, 0), 0).rgb / PI;
+#elif defined(DEBUG_ORIGIN)
+    return shown_origin(texel.xy);
 #else
     return vec3(0.0);
 #endif
@@ -107,7 +126,7 @@ vec3 background_radiance(vec2 pixel)
 #endif
 }
 
-#if defined(FILM_DIFFUSE_COLOR) || defined(FILM_GLOSSY_COLOR)
+#if defined(FILM_DIFFUSE_COLOR) || defined(FILM_GLOSSY_COLOR) || defined(INDIRECT)
 /** The surface of the nearest layer. */
 Surface surface_of(ivec3 texel, vec2 pixel)
 {
@@ -119,20 +138,38 @@ Surface surface_of(ivec3 texel, vec2 pixel)
 }
 #endif
 
+#ifdef INDIRECT
+/** Radiance that the nearest layer reflects diffusely of the irradiance that the indirect method found. */
+vec3 indirect_radiance(ivec3 first, vec2 pixel)
+{
+    vec3 normal = decode_octahedral(texelFetch(normal_layers, first, 0).rg);
+    float n_dot_v = clamp(dot(normal, view_direction(pixel)), 0.0, 1.0);
+    vec3 albedo = diffuse_directional_albedo(surface_of(first, pixel), n_dot_v);
+    return albedo * texelFetch(irradiance_layers, first, 0).rgb / PI;
+}
+#endif
+
 void main()
 {
     vec2 pixel = gl_FragCoord.xy + float(guard_band);
+    ivec3 first = ivec3(pixel, 0);
+#ifdef INDIRECT
+    vec3 indirect = indirect_radiance(first, pixel);
+#endif
+#ifdef FILM_COMBINED
     ivec3 shown = ivec3(pixel, shown_layer);
     float view_depth = texelFetch(view_depth_layers, shown, 0).r;
     if (isinf(view_depth))
         out_combined = opaque != 0 ? vec4(background_radiance(pixel), 1.0) : vec4(0.0);
     else
         out_combined = vec4(shown_color(shown, view_depth), 1.0);
-
-    ivec3 first = ivec3(pixel, 0);
-#if defined(FILM_NORMAL) || defined(FILM_DIFFUSE_COLOR) || defined(FILM_GLOSSY_COLOR) || defined(FILM_ENVIRONMENT)
-    bool covered = !isinf(texelFetch(view_depth_layers, first, 0).r);
+#ifdef ADD_INDIRECT
+    if (!isinf(view_depth))
+        out_combined.rgb += indirect;
 #endif
+#endif
+
+    bool covered = !isinf(texelFetch(view_depth_layers, first, 0).r);
 #ifdef FILM_NORMAL
     vec3 normal = decode_octahedral(texelFetch(normal_layers, first, 0).rg);
     out_normal = vec4(covered ? normal : vec3(0.0), 0.0);
@@ -163,5 +200,11 @@ void main()
 #endif
 #ifdef FILM_ENVIRONMENT
     out_environment = vec4(covered ? vec3(0.0) : background_radiance(pixel), 0.0);
+#endif
+#ifdef FILM_DIFFUSE_INDIRECT
+    out_diffuse_indirect = vec4(0.0);
+#ifdef INDIRECT
+    out_diffuse_indirect = vec4(covered ? indirect : vec3(0.0), 0.0);
+#endif
 #endif
 }

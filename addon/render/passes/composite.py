@@ -6,7 +6,7 @@ from itertools import combinations
 
 from ...scene import Channel, DebugView, SunDisc
 from ..environment import ENVIRONMENT_DEFINE, ENVIRONMENT_UNIFORMS, MAP_SAMPLER, environment_uniforms
-from ..plan import SUM_CHANNELS, PlannedPass
+from ..plan import SUM_CHANNELS, PlannedPass, film_target
 from ..programs import ProgramSpec
 from ..uniforms import UniformBlock
 from .base import Frame, subsets
@@ -30,6 +30,9 @@ COMPOSITE_UNIFORMS = UniformBlock(
     ),
 )
 
+MOST_TARGETS = 8
+"""Images that a fragment shader writes at once: what every OpenGL 4.1 can."""
+
 
 class CompositePass(FullscreenPass):
     """Writes the film."""
@@ -52,15 +55,24 @@ class CompositePass(FullscreenPass):
                 yield _program(read | film | {"DIRECT"})
         for background in subsets(("ENVIRONMENT", "FILM_ENVIRONMENT")):
             yield _program(background | {"DIRECT", "SUN_DISC"})
+        for surface in subsets(("SPECULAR", "DIFFUSE_ROUGHNESS", "PHONG", "DIRECT", "FILM_DIFFUSE_INDIRECT")):
+            yield _program(surface | {"INDIRECT", "ADD_INDIRECT"})
+        yield _program(frozenset({"INDIRECT", "DEBUG_DEPTH", "FILM_DIFFUSE_INDIRECT"}))
+        yield _program(frozenset({"INDIRECT", "FILM_DIFFUSE_INDIRECT"}), (Channel.DIFFUSE_INDIRECT,))
 
     def run(self, frame: Frame, planned: PlannedPass) -> None:
         """Add one sample to the film."""
-        spec = _program(planned.defines)
         # A preview is only shown until there is something better: the world shines through walls in it.
         lit = any(name.startswith("direct.") for name in planned.reads)
         over = lit and frame.lighting.plan.preview and frame.sample.index == 1
-        framebuffer = frame.pool.framebuffer(tuple((target.name, 0) for target in planned.writes))
-        frame.film.begin_sample(framebuffer, over=over)
+        sums = [channel for channel in SUM_CHANNELS if film_target(channel) in planned.writes]
+        frame.film.begin_sample(over=over)
+        for first in range(0, len(sums), MOST_TARGETS):
+            self._add(frame, planned, tuple(sums[first : first + MOST_TARGETS]))
+
+    def _add(self, frame: Frame, planned: PlannedPass, sums: tuple[Channel, ...]) -> None:
+        spec = _program(planned.defines, sums)
+        frame.film.bind(frame.pool.framebuffer(tuple((film_target(channel).name, 0) for channel in sums)))
         self._fullscreen.bind(frame, spec, planned)
         debug = frame.settings.debug_view is not DebugView.NONE
         world = frame.scene.world
@@ -88,8 +100,16 @@ def _sun_disc_uniforms(disc: SunDisc | None) -> dict[str, object]:
     }
 
 
-def _program(defines: frozenset[str]) -> ProgramSpec:
-    sums = [channel for channel in SUM_CHANNELS if channel is Channel.COMBINED or f"FILM_{channel.value}" in defines]
+def _define(channel: Channel) -> str:
+    return f"FILM_{channel.value}"
+
+
+def _program(defines: frozenset[str], sums: tuple[Channel, ...] | None = None) -> ProgramSpec:
+    """The program that adds up some of the sums that the defines ask for; None: all of them."""
+    if sums is None:
+        sums = tuple(channel for channel in SUM_CHANNELS if channel is Channel.COMBINED or _define(channel) in defines)
+    others = {_define(channel) for channel in SUM_CHANNELS}
+    defines = (defines - others) | {_define(channel) for channel in sums}
     outputs = "".join(
         f"layout(location = {index}) out vec4 out_{channel.value.lower()};\n" for index, channel in enumerate(sums)
     )

@@ -105,7 +105,7 @@ def light_uniforms(frame: Frame) -> dict[str, object]:
     directions = max(lighting.plan.world_directions * lighting.sample_count, 1)
     return {
         **environment_uniforms(world),
-        "world_factors": (float(world.seen_by_diffuse), float(world.seen_by_glossy)),
+        "world_factors": lighting.world_factors,
         "shadow_jitter": (shift[0] - 0.5, shift[1] - 0.5),
         "pixel_shift": shift,
         "highlight_jitter": lighting.point_spacing,

@@ -37,6 +37,10 @@ CHANNEL_SAMPLERS = {
     "direct.radiance": "radiance_layers",
     "direct.diffuse": "diffuse_layers",
     "direct.glossy": "glossy_layers",
+    "indirect.gathered": "gathered",
+    "indirect.blended": "blended",
+    "indirect.irradiance": "irradiance_layers",
+    "indirect.origin": "origin_layers",
 }
 """Target -> the sampler that shaders read it through."""
 

@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which passes find indirect light, and why the others are left out. Pure: no OpenGL, no Blender."""
+
+from dataclasses import dataclass
+
+from ..scene import DebugView, IndirectMethod, IndirectSettings, Material, RenderSettings, Scene, ShadingModel
+from ..scene.indirect import RAY_METHODS, WORLD_METHODS
+from .layout import TargetSpec
+from .planned_pass import LeftOut, PlannedPass
+
+GATHERED_TARGET = "indirect.gathered"
+"""Irradiance (W/m²) that one sample found, and the variance of its luminance; a texel for `divisor`² pixels."""
+
+BLENDED_TARGET = "indirect.blended"
+"""The same, blended with that of the views before."""
+
+IRRADIANCE_TARGET = "indirect.irradiance"
+"""Irradiance (W/m²) of the nearest layer, of every pixel."""
+
+ORIGIN_TARGET = "indirect.origin"
+"""What debug views of indirect light show."""
+
+INDIRECT_DEBUG_VIEWS = frozenset(
+    {
+        DebugView.INDIRECT,
+        DebugView.GRID_CELLS,
+        DebugView.GRID_RADIANCE,
+        DebugView.MARCH_HITS,
+        DebugView.LIGHT_ORIGIN,
+    }
+)
+
+_PASS_OF_METHOD = {
+    IndirectMethod.OCCLUSION: "occlusion",
+    IndirectMethod.SSAO: "occlusion",
+    IndirectMethod.RADIOSITY: "radiosity",
+    IndirectMethod.DEEP_MARCH: "deep_march",
+    IndirectMethod.MARCH_GRID: "gather",
+}
+INDIRECT_PASSES = (*dict.fromkeys(_PASS_OF_METHOD.values()), "radiance_grid", "temporal", "filter")
+"""Every pass that has to do with indirect light."""
+
+_ORIGIN_VIEWS = {
+    IndirectMethod.DEEP_MARCH: {DebugView.MARCH_HITS, DebugView.LIGHT_ORIGIN},
+    IndirectMethod.MARCH_GRID: INDIRECT_DEBUG_VIEWS - {DebugView.INDIRECT},
+}
+
+
+@dataclass(frozen=True)
+class IndirectNeeds:
+    """What a picture's indirect light asks of the passes before it.
+
+    `method`: NONE where there is none. `layers` that it reads, and whether their `exit` surfaces. `world_gathered`:
+    whether it finds the world's diffuse light, so that `direct` need not. `channels` of the G-buffer that it reads in
+    all its layers.
+    """
+
+    method: IndirectMethod = IndirectMethod.NONE
+    layers: int = 1
+    exit: bool = False
+    world_gathered: bool = False
+    channels: tuple[str, ...] = ()
+
+    @property
+    def reads_grid(self) -> bool:
+        """Whether there must be a radiance grid."""
+        return self.method is IndirectMethod.MARCH_GRID
+
+    @property
+    def any(self) -> bool:
+        """Whether there is indirect light at all."""
+        return self.method is not IndirectMethod.NONE
+
+
+def reads_layers(indirect: IndirectSettings) -> bool:
+    """Whether a method looks behind the nearest layer."""
+    if indirect.method is IndirectMethod.MARCH_GRID:
+        return indirect.contact_steps > 0
+    return indirect.method is not IndirectMethod.NONE
+
+
+def indirect_needs(scene: Scene, settings: RenderSettings, left_out: list[LeftOut]) -> IndirectNeeds:
+    """What the scene's indirect light needs, if it has any."""
+    reason = _why_none(scene, settings)
+    if reason:
+        left_out += [LeftOut(name, reason) for name in INDIRECT_PASSES]
+        return IndirectNeeds()
+    indirect, method, layered = settings.indirect, settings.indirect.method, reads_layers(settings.indirect)
+    surfaces = ("normal", "base_color", "material")
+    return IndirectNeeds(
+        method,
+        layers=settings.layers if layered else 1,
+        exit=method in RAY_METHODS and indirect.exit_surfaces and layered,
+        world_gathered=method in WORLD_METHODS and scene.world.shines and scene.world.seen_by_diffuse,
+        channels=("normal",) if method in (IndirectMethod.OCCLUSION, IndirectMethod.SSAO) else surfaces,
+    )
+
+
+def plan_indirect(
+    scene: Scene,
+    settings: RenderSettings,
+    needs: IndirectNeeds,
+    left_out: list[LeftOut],
+    *,
+    direct: PlannedPass | None,
+    continuous: bool,
+) -> tuple[PlannedPass, ...]:
+    """The passes in order; the last one writes `IRRADIANCE_TARGET`. `direct`: what shades the layers, if anything."""
+    if not needs.any:
+        return ()
+    indirect, name = settings.indirect, _PASS_OF_METHOD[needs.method]
+    left_out += [
+        LeftOut(other, "another method finds indirect light") for other in _PASS_OF_METHOD.values() if other != name
+    ]
+    grid = ()
+    if needs.reads_grid:
+        grid = (PlannedPass("radiance_grid", reads=("tiles.depth",)),)
+    else:
+        left_out.append(LeftOut("radiance_grid", "the method does not read it"))
+    blends = continuous and indirect.temporal_filter
+    filters = indirect.spatial_filter or indirect.divisor > 1
+    written = GATHERED_TARGET if blends or filters else IRRADIANCE_TARGET
+    spec = TargetSpec(written, 4, "f4", divisor=indirect.divisor)
+    origin = settings.debug_view in _ORIGIN_VIEWS.get(needs.method, ())
+    method = PlannedPass(
+        name,
+        reads=(
+            "gbuffer.view_depth",
+            *(f"gbuffer.{channel}" for channel in needs.channels),
+            *(("exit.view_depth",) if needs.exit else ()),
+            *(("direct.radiance",) if direct is not None and needs.method not in _OCCLUSIONS else ()),
+        ),
+        writes=(spec, *((TargetSpec(ORIGIN_TARGET, 4, "f4", divisor=indirect.divisor),) if origin else ())),
+        defines=_method_defines(scene, settings, needs),
+    )
+    return (*grid, method, *_plan_filters(settings, written, left_out, blends=blends, filters=filters))
+
+
+_OCCLUSIONS = (IndirectMethod.OCCLUSION, IndirectMethod.SSAO)
+
+
+def _method_defines(scene: Scene, settings: RenderSettings, needs: IndirectNeeds) -> frozenset[str]:
+    """Defines of the pass that finds the light: the method, how many layers it reads, what there is of the world."""
+    defines = {needs.method.value, f"LAYERS {needs.layers}"}
+    if needs.exit:
+        defines.add("EXIT")
+    if needs.world_gathered:
+        defines |= {"WORLD", "ENVIRONMENT"} if scene.world.environment is not None else {"WORLD"}
+    if settings.debug_view in _ORIGIN_VIEWS.get(needs.method, ()):
+        defines.add(f"DEBUG_{settings.debug_view.value}")
+    return frozenset(defines)
+
+
+def _plan_filters(
+    settings: RenderSettings, written: str, left_out: list[LeftOut], *, blends: bool, filters: bool
+) -> tuple[PlannedPass, ...]:
+    indirect = settings.indirect
+    passes: list[PlannedPass] = []
+    if blends:
+        target = TargetSpec(BLENDED_TARGET if filters else IRRADIANCE_TARGET, 4, "f4", divisor=indirect.divisor)
+        passes.append(
+            PlannedPass("temporal", ("gbuffer.view_depth", "gbuffer.normal", "gbuffer.motion", written), (target,))
+        )
+        written = target.name
+    else:
+        off = "temporal filter is off" if not indirect.temporal_filter else "a final render has no views before it"
+        left_out.append(LeftOut("temporal", off))
+    if filters:
+        reads = ("gbuffer.view_depth", "gbuffer.normal", written)
+        scratch = tuple(
+            TargetSpec(f"filter.scratch_{index}", 4, "f4", divisor=indirect.divisor)
+            for index in range(2 if indirect.spatial_filter else 0)
+        )
+        defines = frozenset({"SPATIAL"} if indirect.spatial_filter else ())
+        passes.append(PlannedPass("filter", reads, (TargetSpec(IRRADIANCE_TARGET, 4, "f4"), *scratch), defines))
+    else:
+        left_out.append(LeftOut("filter", "it is off, and every pixel gathers its own light"))
+    return tuple(passes)
+
+
+def _why_none(scene: Scene, settings: RenderSettings) -> str | None:
+    """Why a picture has no indirect light; None where it has."""
+    method, world = settings.indirect.method, scene.world.shines and scene.world.seen_by_diffuse
+    materials = scene.materials.values()
+    reason = None
+    if method is IndirectMethod.NONE:
+        reason = "the method is None"
+    elif not any(batch.seen_by_camera for batch in scene.batches):
+        reason = "no geometry"
+    elif settings.shading_model is ShadingModel.GOURAUD:
+        reason = "Gouraud shading lights vertices, not pixels"
+    elif settings.debug_view not in INDIRECT_DEBUG_VIEWS | {DebugView.NONE}:
+        reason = "the debug view does not show it"
+    elif not any(_reflects_diffusely(material) for material in materials):
+        reason = "nothing reflects diffusely"
+    elif method in _OCCLUSIONS and not world:
+        reason = "no world light, which is all that the method finds"
+    elif not (scene.lights or world or any(material.is_emissive for material in materials)):
+        reason = "no light, emission or world"
+    return reason
+
+
+def _reflects_diffusely(material: Material) -> bool:
+    return max(material.base_color) > 0.0 and material.metallic < 1.0
