@@ -260,6 +260,10 @@ class GeometryStore:
             self._vertex_arrays[key] = vertex_array
         return self._vertex_arrays[key]
 
+    def instances(self, batch: InstanceBatch) -> moderngl.Buffer:
+        """Where the instances of a batch are: `INSTANCE_FORMAT`, in `drawing_order`."""
+        return self._batch(batch).buffer
+
     def poses(self, batch: InstanceBatch, other: Correspondence) -> moderngl.Texture:
         """Where the instances of a batch are in another frame. Raises RenderError where memory does not suffice."""
         matrices = other.matrices(batch)

@@ -17,8 +17,29 @@ BLENDED_TARGET = "indirect.blended"
 IRRADIANCE_TARGET = "indirect.irradiance"
 """Irradiance (W/m²) of the nearest layer, of every pixel."""
 
+HISTORY_TARGETS = ("temporal.history_0", "temporal.history_1")
+"""Mean irradiance of earlier samples on what each gathered texel looks at; one is read while the other is written."""
+
+HISTORY_SURFACES = ("temporal.surfaces_0", "temporal.surfaces_1")
+"""What that is: octahedral normal, view depth (m), and how many samples the mean is of."""
+
+FILTER_SURFACES = "filter.surfaces"
+"""Camera-space normal and view depth (m) of what each gathered texel looks at."""
+
+FILTER_SCRATCH = ("filter.scratch_0", "filter.scratch_1")
+"""Irradiance between the iterations of the filter."""
+
 ORIGIN_TARGET = "indirect.origin"
 """What debug views of indirect light show."""
+
+BOUNCE_TARGETS = ("deep_march.bounce_0", "deep_march.bounce_1")
+"""Irradiance (W/m²) of all layers after one bounce and after the next, in turn."""
+
+RADIOSITY_TARGETS = ("radiosity.bounce_0", "radiosity.bounce_1")
+"""Radiance (W/(sr·m²)) of all layers after one bounce and after the next, in turn."""
+
+BOUNCE_DIVISOR = 8
+"""Pixels along each side of those that share an irradiance there."""
 
 INDIRECT_DEBUG_VIEWS = frozenset(
     {
@@ -79,6 +100,13 @@ def reads_layers(indirect: IndirectSettings) -> bool:
     return indirect.method is not IndirectMethod.NONE
 
 
+def gathers_world(indirect: IndirectSettings) -> bool:
+    """Whether a method finds the world's diffuse light; the paper's composite weighs it against what it finds."""
+    return indirect.method in WORLD_METHODS or (
+        indirect.method is IndirectMethod.RADIOSITY and indirect.paper_composite
+    )
+
+
 def indirect_needs(scene: Scene, settings: RenderSettings, left_out: list[LeftOut]) -> IndirectNeeds:
     """What the scene's indirect light needs, if it has any."""
     reason = _why_none(scene, settings)
@@ -91,7 +119,7 @@ def indirect_needs(scene: Scene, settings: RenderSettings, left_out: list[LeftOu
         method,
         layers=settings.layers if layered else 1,
         exit=method in RAY_METHODS and indirect.exit_surfaces and layered,
-        world_gathered=method in WORLD_METHODS and scene.world.shines and scene.world.seen_by_diffuse,
+        world_gathered=gathers_world(indirect) and scene.world.shines and scene.world.seen_by_diffuse,
         channels=("normal",) if method in (IndirectMethod.OCCLUSION, IndirectMethod.SSAO) else surfaces,
     )
 
@@ -130,47 +158,77 @@ def plan_indirect(
             *(("exit.view_depth",) if needs.exit else ()),
             *(("direct.radiance",) if direct is not None and needs.method not in _OCCLUSIONS else ()),
         ),
-        writes=(spec, *((TargetSpec(ORIGIN_TARGET, 4, "f4", divisor=indirect.divisor),) if origin else ())),
+        writes=(
+            spec,
+            *((TargetSpec(ORIGIN_TARGET, 4, "f4", divisor=indirect.divisor),) if origin else ()),
+            *_bounce_targets(indirect, needs),
+        ),
         defines=_method_defines(scene, settings, needs),
     )
-    return (*grid, method, *_plan_filters(settings, written, left_out, blends=blends, filters=filters))
+    return (*grid, method, *plan_filters(settings, written, left_out, blends=blends, filters=filters))
 
 
 _OCCLUSIONS = (IndirectMethod.OCCLUSION, IndirectMethod.SSAO)
 
 
+def _bounce_targets(indirect: IndirectSettings, needs: IndirectNeeds) -> tuple[TargetSpec, ...]:
+    """What further bounces through the layers are kept in."""
+    if indirect.bounces == 1:
+        return ()
+    if needs.method is IndirectMethod.DEEP_MARCH:
+        return tuple(TargetSpec(name, 4, "f4", needs.layers, divisor=BOUNCE_DIVISOR) for name in BOUNCE_TARGETS)
+    if needs.method is IndirectMethod.RADIOSITY:
+        return tuple(TargetSpec(name, 4, "f4", needs.layers, divisor=indirect.divisor) for name in RADIOSITY_TARGETS)
+    return ()
+
+
 def _method_defines(scene: Scene, settings: RenderSettings, needs: IndirectNeeds) -> frozenset[str]:
     """Defines of the pass that finds the light: the method, how many layers it reads, what there is of the world."""
     defines = {needs.method.value, f"LAYERS {needs.layers}"}
+    if needs.reads_grid and reads_layers(settings.indirect):
+        defines.add("CONTACT")
     if needs.exit:
         defines.add("EXIT")
     if needs.world_gathered:
         defines |= {"WORLD", "ENVIRONMENT"} if scene.world.environment is not None else {"WORLD"}
     if settings.debug_view in _ORIGIN_VIEWS.get(needs.method, ()):
         defines.add(f"DEBUG_{settings.debug_view.value}")
+    if needs.method is IndirectMethod.RADIOSITY:
+        defines |= _radiosity_defines(scene, settings)
     return frozenset(defines)
 
 
-def _plan_filters(
+def _radiosity_defines(scene: Scene, settings: RenderSettings) -> set[str]:
+    """Which composite, and what decides how much surfaces reflect diffusely."""
+    materials, physical = scene.materials.values(), settings.shading_model is ShadingModel.PHYSICAL
+    needed = {
+        "PAPER": settings.indirect.paper_composite,
+        "SPECULAR": any(material.is_glossy for material in materials),
+        "DIFFUSE_ROUGHNESS": physical and any(material.diffuse_roughness > 0.0 for material in materials),
+        "PHONG": not physical,
+    }
+    return {name for name, wanted in needed.items() if wanted}
+
+
+def plan_filters(
     settings: RenderSettings, written: str, left_out: list[LeftOut], *, blends: bool, filters: bool
 ) -> tuple[PlannedPass, ...]:
     indirect = settings.indirect
     passes: list[PlannedPass] = []
     if blends:
-        target = TargetSpec(BLENDED_TARGET if filters else IRRADIANCE_TARGET, 4, "f4", divisor=indirect.divisor)
-        passes.append(
-            PlannedPass("temporal", ("gbuffer.view_depth", "gbuffer.normal", "gbuffer.motion", written), (target,))
-        )
-        written = target.name
+        reads = ("gbuffer.view_depth", "gbuffer.normal", "gbuffer.motion", written)
+        blended = BLENDED_TARGET if filters else IRRADIANCE_TARGET
+        names = (blended, *HISTORY_TARGETS, *HISTORY_SURFACES)
+        writes = tuple(TargetSpec(name, 4, "f4", divisor=indirect.divisor) for name in names)
+        passes.append(PlannedPass("temporal", reads, writes))
+        written = blended
     else:
         off = "temporal filter is off" if not indirect.temporal_filter else "a final render has no views before it"
         left_out.append(LeftOut("temporal", off))
     if filters:
         reads = ("gbuffer.view_depth", "gbuffer.normal", written)
-        scratch = tuple(
-            TargetSpec(f"filter.scratch_{index}", 4, "f4", divisor=indirect.divisor)
-            for index in range(2 if indirect.spatial_filter else 0)
-        )
+        names = (FILTER_SURFACES, *(FILTER_SCRATCH if indirect.spatial_filter else ()))
+        scratch = tuple(TargetSpec(name, 4, "f4", divisor=indirect.divisor) for name in names)
         defines = frozenset({"SPATIAL"} if indirect.spatial_filter else ())
         passes.append(PlannedPass("filter", reads, (TargetSpec(IRRADIANCE_TARGET, 4, "f4"), *scratch), defines))
     else:

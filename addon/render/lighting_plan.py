@@ -61,7 +61,6 @@ def plan_lights(
     left_out: list[tuple[str, str]] = []
     lights = _lights_in_reach(scene, settings, camera, memory, left_out)
     surfaces, dim = mesh_lights(scene, settings.alpha_threshold, memory)
-    memory.forget_unused()
     left_out += [(f"light of {light.name}", _NOT_WORTH_IT) for light in dim]
     left_out += _unsampled_emission(scene)
     casts = any(light.casts_shadow for light in lights) or bool(surfaces) or _samples_world(scene, world_gathered)

@@ -2,7 +2,7 @@
 """Which passes a scene needs, and why the others are left out. Pure: no OpenGL, no Blender."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 
 from ..scene import Camera, Channel, DebugView, RenderSettings, Scene, ShadingModel, Variant
@@ -30,7 +30,7 @@ class Plan:
     `layers`: how many are built, by `variant`, which is TWO_PASS for a single one. `channels`: those that somebody
     reads, each with how many layers of it, the nearest first. `look_ahead`: whether an extra layer shows the next
     picture's depth. `guard_band`: pixels around the picture, on each side. `lights`: what lights it. `indirect`: what
-    its indirect light needs.
+    its indirect light needs. `bounced_lights`: what lights the radiance grid, besides the world.
     """
 
     passes: tuple[PlannedPass, ...]
@@ -42,6 +42,7 @@ class Plan:
     guard_band: int
     lights: LightPlan
     indirect: IndirectNeeds
+    bounced_lights: LightPlan
 
     @property
     def one_pass(self) -> bool:
@@ -131,9 +132,11 @@ def plan(
     look_ahead = _looks_ahead(variant, settings, continuous=continuous)
     guard_band = _plan_guard_band(settings, variant, indirect, left_out)
     view = camera and guarded(camera, settings, guard_band)
-    lights, dark = plan_lights(
-        scene, settings, view, memory or Memory(), continuous=continuous, world_gathered=indirect.world_gathered
-    )
+    memory = memory or Memory()
+    gathered = indirect.world_gathered
+    lights, dark = plan_lights(scene, settings, view, memory, continuous=continuous, world_gathered=gathered)
+    bounced_lights = _bounced_lights(scene, settings, indirect, memory)
+    memory.forget_unused()
     left_out += [LeftOut(name, reason) for name, reason in dark]
     lighting = plan_lighting_passes(scene, settings, lights, layers, left_out, tiled=indirect.reads_grid)
     direct = next((planned for planned in lighting if planned.name in SHADING_PASSES), None)
@@ -158,7 +161,26 @@ def plan(
         *bounced,
         _plan_composite(scene, settings, direct, indirect, bounced),
     ]
-    return Plan(tuple(passes), tuple(left_out), layers, variant, channels, look_ahead, guard_band, lights, indirect)
+    return Plan(
+        tuple(passes),
+        tuple(left_out),
+        layers,
+        variant,
+        channels,
+        look_ahead,
+        guard_band,
+        lights,
+        indirect,
+        bounced_lights,
+    )
+
+
+def _bounced_lights(scene: Scene, settings: RenderSettings, indirect: IndirectNeeds, memory: Memory) -> LightPlan:
+    """The lights of what the camera may not see, but what it sees may be lit by; the world not among them."""
+    if not indirect.reads_grid:
+        return LightPlan()
+    lights, _ = plan_lights(scene, settings, None, memory, continuous=False, world_gathered=True)
+    return replace(lights, world_directions=0, casts_shadows=any(batch.casts_shadow for batch in scene.batches))
 
 
 def guarded(camera: Camera, settings: RenderSettings, guard_band: int) -> Camera:

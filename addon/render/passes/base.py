@@ -3,7 +3,7 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import moderngl
 
@@ -23,6 +23,9 @@ from ..programs import ProgramSpec
 from ..sampling import Sample
 from ..targets import TexturePool
 from ..uniforms import UniformBlock
+
+if TYPE_CHECKING:
+    from ..grid.textures import GridTextures
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,7 @@ class Frame:
     `previous`: the frame before. `history`: what a final render draws its oracle from, if not from the frame itself.
     `ahead`: the next picture as far as it is known or predicted, None where that is the next sample.
     `continuous`: as in `Sequence`. `drift`: what `drift_since` found. `shadows`: this sample's maps, if it has any.
+    `grid`: the radiance grid, where there is one.
     """
 
     device: Device
@@ -71,6 +75,7 @@ class Frame:
     continuous: bool
     drift: float | None = None
     shadows: ShadowTextures | None = None
+    grid: "GridTextures | None" = None
 
     @property
     def moment(self) -> Moment:

@@ -43,6 +43,14 @@ LIGHT_TABLE_SIZES = frozenset(
     }
 )
 
+DIRECT_SIZES = LIGHT_TABLE_SIZES | {
+    f"TEXELS_PER_MAP {TEXELS_PER_MAP}",
+    f"TILE_SIZE {TILE_SIZE}",
+    f"LIGHTS_PER_PAGE {LIGHTS_PER_PAGE}",
+}
+DIRECT_SAMPLERS = (*LIGHT_SAMPLERS, "shadow_atlas", "shadow_table")
+"""What `common/direct_light.glsl` needs besides DIRECT_UNIFORMS."""
+
 _DIRECTIONS_PER_LOBE = 8.0
 """The world's samples must fall that densely into a reflection's lobe, or a wider one is taken for what they show."""
 
@@ -66,17 +74,10 @@ class DirectPass(FullscreenPass):
             split = layer == 0 and "SPLIT" in defines
             spec = _program(defines if split else defines - {"SPLIT"})
             self._fullscreen.bind(frame, spec, planned)
-            self._bind(frame, spec)
+            bind_lights_and_shadows(frame, spec)
             targets = planned.writes if split else planned.writes[:1]
             frame.pool.framebuffer(tuple((target.name, layer) for target in targets)).use()
             self._fullscreen.draw(spec, **light_uniforms(frame), layer=layer)
-
-    def _bind(self, frame: Frame, spec: ProgramSpec) -> None:
-        bind_lights(frame, spec)
-        if "SHADOWS" in spec.defines and frame.shadows is not None:
-            if frame.shadows.atlas is not None:
-                frame.shadows.atlas.use(spec.samplers.index("shadow_atlas"))
-            frame.shadows.table.use(spec.samplers.index("shadow_table"))
 
 
 def program_defines(names: Sequence[str]) -> list[frozenset[str]]:
@@ -98,6 +99,15 @@ def bind_lights(frame: Frame, spec: ProgramSpec) -> None:
         frame.environment.bind(frame.scene.world.environment, spec)
 
 
+def bind_lights_and_shadows(frame: Frame, spec: ProgramSpec) -> None:
+    """Bind those, and this sample's shadow maps, to the units of DIRECT_SAMPLERS."""
+    bind_lights(frame, spec)
+    if "SHADOWS" in spec.defines and frame.shadows is not None:
+        if frame.shadows.atlas is not None:
+            frame.shadows.atlas.use(spec.samplers.index("shadow_atlas"))
+        frame.shadows.table.use(spec.samplers.index("shadow_table"))
+
+
 def light_uniforms(frame: Frame) -> dict[str, object]:
     """DIRECT_UNIFORMS of this sample, except the layer."""
     world, lighting = frame.scene.world, frame.lighting
@@ -117,10 +127,4 @@ def light_uniforms(frame: Frame) -> dict[str, object]:
 
 
 def _program(defines: frozenset[str]) -> ProgramSpec:
-    sizes = LIGHT_TABLE_SIZES | {
-        f"TEXELS_PER_MAP {TEXELS_PER_MAP}",
-        f"TILE_SIZE {TILE_SIZE}",
-        f"LIGHTS_PER_PAGE {LIGHTS_PER_PAGE}",
-    }
-    samplers = (*LIGHT_SAMPLERS, "shadow_atlas", "shadow_table")
-    return fullscreen_program("direct/direct.frag", DIRECT_UNIFORMS, defines | sizes, samplers=samplers)
+    return fullscreen_program("direct/direct.frag", DIRECT_UNIFORMS, defines | DIRECT_SIZES, samplers=DIRECT_SAMPLERS)

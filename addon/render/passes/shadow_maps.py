@@ -95,9 +95,7 @@ class ShadowMapsPass:
         draws = frame.draws.of(frame.scene)
         casters = self._casters.of(draws)
         if self._receivers is None:
-            tiles = read_target(frame.pool, DEPTH_TILES_TARGET)
-            jitter = frame.settings.filter_radius
-            self._receivers = visible_receivers(tiles, TILE_SIZE, frame.view, frame.pool.size, jitter)
+            self._receivers = self.find_receivers(frame)
             self._sources = shadow_sources(frame.lighting.plan)
             self._views = {}
             self._rows = {}
@@ -111,6 +109,11 @@ class ShadowMapsPass:
             self._store.forget(fresh)
             raise
         self._write_table(frame, views, slots)
+
+    def find_receivers(self, frame: Frame) -> Receivers:
+        """What shadows fall on: what the camera sees."""
+        tiles = read_target(frame.pool, DEPTH_TILES_TARGET)
+        return visible_receivers(tiles, TILE_SIZE, frame.view, frame.pool.size, frame.settings.filter_radius)
 
     def release(self) -> None:
         """Free the maps and what they are drawn with."""

@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The radiance grid's cells and faces on the GPU, and what draws into them."""
+
+from collections.abc import Callable, Hashable, Sequence
+
+import moderngl
+import numpy as np
+
+from ...scene.arrays import Float64Array
+from ..device import Device, RenderError
+from ..passes.base import UniformBuffer
+from ..programs import ProgramSpec
+from ..uniforms import UniformBlock
+from .faces import FACES_PER_ROW, Faces
+from .levels import MOST_LEVELS, GridLevel
+
+GRID_UNIFORMS = (
+    (
+        "grid_origins",
+        f"vec4[{MOST_LEVELS}]",
+    ),  # of each level its lowest corner, camera-relative, and its cells' side, m
+    ("grid_sizes", f"vec4[{MOST_LEVELS}]"),  # cells along its sides, and below it in the table
+    ("grid_reach", "float"),  # cells that a ray goes through a level before it changes to the next
+    ("grid_level_count", "int"),
+)
+"""Fields that a pass adds to its block to include `common/radiance_grid.glsl`."""
+
+FACE_UNIFORMS = UniformBlock(
+    "FaceUniforms",
+    (
+        *GRID_UNIFORMS,
+        ("ray_shift", "vec2"),  # of all rays' random numbers
+        ("share", "float"),  # of what is added up
+        ("first_face", "int"),  # of those that are drawn
+        ("end_face", "int"),  # the one after the last
+        ("ray", "int"),
+        ("ray_count", "int"),
+    ),
+)
+"""What passes over the faces read."""
+
+GRID_DEFINES = frozenset({f"FACES_PER_ROW {FACES_PER_ROW}"})
+"""Defines that `common/radiance_grid.glsl` needs."""
+
+REACH = 24.0
+"""Cells that a ray goes through a level: then those of the next one, twice as large, are seen under as small an angle
+from where it began as the first were from a twelfth of the way."""
+
+ACCUMULATED = ("base_color", "offset", "normal", "emission")
+"""What is added up of a face's points, each times the area it stands for; the first has the area's sum as alpha."""
+
+_FLOATS = 4
+_FACE_TEXTURES = (
+    *(f"sum_{name}" for name in ACCUMULATED),
+    "planes",
+    "points",
+    "albedo",
+    "emission",
+    "direct",
+    "sky",
+    "indirect",
+    "radiance",
+    "next_indirect",
+    "next_radiance",
+)
+BYTES_PER_FACE = 4 * _FLOATS * len(_FACE_TEXTURES) + 8
+"""Without the rays from cell to cell, which take 4 bytes each."""
+
+
+class GridTextures:
+    """The textures of one grid. `levels`, `faces`: what is in them."""
+
+    def __init__(self, device: Device, levels: tuple[GridLevel, ...], faces: Faces, cell_rays: int) -> None:
+        """Raises RenderError where graphics memory does not suffice."""
+        context = device.context
+        self.levels, self.faces, self.cell_rays = levels, faces, cell_rays
+        table = faces.table
+        self.cells = context.texture3d(table.shape[::-1], 1, np.ascontiguousarray(table), dtype="u4")
+        self.cells.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        size = (FACES_PER_ROW, faces.rows)
+        places = np.zeros((faces.rows * FACES_PER_ROW, 2), np.uint32)
+        places[: faces.count] = faces.places
+        self.places = context.texture(size, 2, places, dtype="u4")
+        self.places.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._faces = {name: context.texture(size, _FLOATS, dtype="f4") for name in _FACE_TEXTURES}
+        for texture in self._faces.values():
+            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self.links = context.texture_array((*size, cell_rays), 1, dtype="u4")
+        self.links.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._device = device
+        self._framebuffers: dict[Hashable, moderngl.Framebuffer] = {}
+        self.bytes = table.nbytes + faces.rows * FACES_PER_ROW * (BYTES_PER_FACE + 4 * cell_rays)
+        try:
+            device.check_upload(f"the radiance grid of {faces.count} faces", self.bytes)
+        except RenderError:
+            self.release()
+            raise
+
+    def texture(self, name: str) -> moderngl.Texture:
+        """One of the faces' textures: RGBA32F, `FACES_PER_ROW` texels wide."""
+        return self._faces[name]
+
+    def exchange(self, *names: str) -> None:
+        """Let each texture change places with the one of the same name that begins with `next_`."""
+        for name in names:
+            following = f"next_{name}"
+            self._faces[name], self._faces[following] = self._faces[following], self._faces[name]
+
+    def framebuffer(self, *names: str) -> moderngl.Framebuffer:
+        """What draws into faces' textures."""
+        textures = [self._faces[name] for name in names]
+        return self._framebuffer(tuple(map(id, textures)), lambda: self._device.context.framebuffer(textures))
+
+    def link_framebuffer(self, ray: int) -> moderngl.Framebuffer:
+        """What draws into the links of one ray of every face."""
+
+        def make() -> moderngl.Framebuffer:
+            framebuffer = self._device.context.framebuffer([self.links])
+            self._device.raw.attach_layers(framebuffer, [(self.links, ray)], None)
+            return framebuffer
+
+        return self._framebuffer(("links", ray), make)
+
+    def _framebuffer(self, key: Hashable, make: Callable[[], moderngl.Framebuffer]) -> moderngl.Framebuffer:
+        if key not in self._framebuffers:
+            self._framebuffers[key] = make()
+        return self._framebuffers[key]
+
+    def release(self) -> None:
+        """Free everything."""
+        self._device.no_framebuffer.use()
+        for framebuffer in self._framebuffers.values():
+            framebuffer.release()
+        self._framebuffers.clear()
+        for texture in (self.cells, self.places, self.links, *self._faces.values()):
+            texture.release()
+
+
+def grid_uniforms(levels: Sequence[GridLevel], origin: Float64Array) -> dict[str, object]:
+    """Values of `GRID_UNIFORMS` for positions relative to `origin` (3,), world space."""
+    origins, sizes = np.zeros((MOST_LEVELS, 4)), np.zeros((MOST_LEVELS, 4))
+    bottom = 0
+    for index, level in enumerate(levels):
+        origins[index] = (*(level.origin - origin), level.cell)
+        sizes[index] = (*level.size, bottom)
+        bottom += level.size[2]
+    return {
+        "grid_origins": origins,
+        "grid_sizes": sizes,
+        "grid_reach": REACH,
+        "grid_level_count": len(levels),
+    }
+
+
+def face_program(
+    fragment: str, blocks: tuple[UniformBlock, ...], defines: frozenset[str], samplers: tuple[str, ...]
+) -> ProgramSpec:
+    """The program of a fragment shader that is run for every face."""
+    return ProgramSpec("common/fullscreen.vert", fragment, defines | GRID_DEFINES, blocks=blocks, samplers=samplers)
+
+
+def face_uniforms(
+    levels: Sequence[GridLevel],
+    origin: Float64Array,
+    faces: tuple[int, int],
+    *,
+    ray: int = 0,
+    ray_count: int = 0,
+    ray_shift: tuple[float, float] = (0.0, 0.0),
+    share: float = 1.0,
+) -> dict[str, object]:
+    """Values of `FACE_UNIFORMS` to draw faces `faces[0]` … `faces[1] − 1`."""
+    return {
+        **grid_uniforms(levels, origin),
+        "ray_shift": ray_shift,
+        "share": share,
+        "first_face": faces[0],
+        "end_face": faces[1],
+        "ray": ray,
+        "ray_count": ray_count,
+    }
+
+
+class FaceDraw:
+    """Draws one triangle over the texels of some faces."""
+
+    def __init__(self, device: Device, *blocks: UniformBlock) -> None:
+        self._device = device
+        self._blocks = blocks
+        self._buffers = [UniformBuffer(device, block) for block in blocks]
+        self._vertex_arrays: dict[ProgramSpec, moderngl.VertexArray] = {}
+
+    def spec(self, fragment: str, defines: frozenset[str] = frozenset(), samplers: tuple[str, ...] = ()) -> ProgramSpec:
+        """The program of a fragment shader."""
+        return face_program(fragment, self._blocks, defines, samplers)
+
+    def draw(
+        self,
+        spec: ProgramSpec,
+        framebuffer: moderngl.Framebuffer,
+        faces: tuple[int, int],
+        *uniforms: dict[str, object],
+    ) -> None:
+        """Draw the texels of faces `faces[0]` … `faces[1] − 1`; of others in their rows the shader keeps away."""
+        first, end = faces[0] // FACES_PER_ROW, -(-faces[1] // FACES_PER_ROW)
+        if end <= first:
+            return
+        if spec not in self._vertex_arrays:
+            self._vertex_arrays[spec] = self._device.context.vertex_array(self._device.programs.get(spec), [])
+        for binding, (buffer, values) in enumerate(zip(self._buffers, uniforms, strict=True)):
+            buffer.bind(binding, **values)
+        framebuffer.viewport = (0, first, FACES_PER_ROW, end - first)
+        framebuffer.use()
+        self._vertex_arrays[spec].render(moderngl.TRIANGLES, vertices=3)
+
+    def release(self) -> None:
+        """Free the buffers and vertex arrays."""
+        for buffer in self._buffers:
+            buffer.release()
+        for vertex_array in self._vertex_arrays.values():
+            vertex_array.release()
+        self._vertex_arrays.clear()

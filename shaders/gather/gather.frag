@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Irradiance of the nearest layer by cosine-distributed rays: through the layers of the deep G-buffer near the pixel,
+// from there on through the radiance grid, and where they meet nothing from the world.
+
+#include "common/camera.glsl"
+#include "common/finite.glsl"
+#include "common/hash.glsl"
+#include "common/octahedral.glsl"
+#include "generated/GatherUniforms.glsl"
+#include "common/environment.glsl"
+#include "common/gather.glsl"
+#include "common/radiance_grid.glsl"
+#ifdef CONTACT
+#include "common/deep_march.glsl"
+#else
+uniform sampler2DArray view_depth_layers;
+#endif
+
+uniform sampler2DArray normal_layers;
+uniform sampler2DArray base_color_layers;
+uniform sampler2DArray material_layers;
+uniform sampler2DArray radiance_layers;
+uniform sampler2D face_radiance;
+uniform sampler2D face_indirect;
+
+layout(location = 0) out vec4 out_gathered; // irradiance, W/m², and the variance of its luminance
+#if defined(DEBUG_GRID_CELLS) || defined(DEBUG_GRID_RADIANCE) || defined(DEBUG_MARCH_HITS) || defined(DEBUG_LIGHT_ORIGIN)
+#define SHOWN
+layout(location = 1) out vec4 out_origin;
+#endif
+
+const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722); // of linear Rec. 709
+
+/** The finest level that holds a position, the coarsest where none does. */
+int level_at(vec3 position)
+{
+    int level = 0;
+    while (level < grid_level_count - 1 && !grid_has(ivec3(floor(grid_place(position, level))), level))
+        ++level;
+    return level;
+}
+
+/** A face of the cell at a position, of the orientation nearest to a normal; NO_FACE where there is none. */
+int face_at(vec3 position, vec3 normal, int level)
+{
+    ivec3 cell = ivec3(floor(grid_place(position, level)));
+    if (!grid_has(cell, level))
+        return NO_FACE;
+    uint entry = grid_entry(cell, level);
+    int orientation = orientation_of(normal);
+    return (entry >> uint(orientation) & 1u) != 0u ? face_of(entry, orientation) : NO_FACE;
+}
+
+#ifdef CONTACT
+/** Radiance that a layer's surface sends: what lights it directly, and what the grid knows of the rest. */
+vec3 layer_radiance(ivec3 texel, vec3 position, int level)
+{
+    vec3 normal = decode_octahedral(texelFetch(normal_layers, texel, 0).rg);
+    float metallic = texelFetch(material_layers, texel, 0).r;
+    vec3 albedo = texelFetch(base_color_layers, texel, 0).rgb * (1.0 - metallic);
+    int face = face_at(position - 0.5 * START_OFFSET * grid_cell_size(level) * normal, normal, level);
+    vec3 indirect = face != NO_FACE ? texelFetch(face_indirect, face_texel(face), 0).rgb : vec3(0.0);
+    return texelFetch(radiance_layers, texel, 0).rgb + albedo / PI * indirect;
+}
+#endif
+
+void main()
+{
+    ivec2 texel = ivec2(gl_FragCoord.xy), pixel = gathered_pixel(texel);
+    float view_depth = texelFetch(view_depth_layers, ivec3(pixel, 0), 0).r;
+    out_gathered = vec4(0.0);
+#ifdef SHOWN
+    out_origin = vec4(0.0);
+#endif
+    if (isinf(view_depth))
+        return;
+    vec2 center = vec2(pixel) + 0.5;
+    vec3 position = relative_position(center, view_depth);
+    vec3 normal = decode_octahedral(texelFetch(normal_layers, ivec3(pixel, 0), 0).rg);
+    int level = level_at(position);
+    float offset = START_OFFSET * grid_cell_size(level);
+    vec3 sum = vec3(0.0), origins = vec3(0.0);
+    float sum_of_squares = 0.0, marched = 0.0;
+    for (int ray = 0; ray < gather_rays; ++ray) {
+        vec3 direction = cosine_direction(normal, ray_random(texel, ray, gather_rays));
+        vec3 radiance = vec3(0.0);
+        float start = offset;
+        bool met = false;
+#ifdef CONTACT
+        float jitter = ray_random(texel, ray, gather_rays).x;
+        float reach = CONTACT_REACH * grid_cell_size(level);
+        MarchHit near = deep_march(position, direction, reach, contact_steps, jitter);
+        met = near.hit;
+        if (near.hit) {
+            radiance = layer_radiance(ivec3(near.pixel, near.layer), position + near.distance * direction, level);
+            marched += 1.0;
+            origins.r += 1.0;
+        }
+        start = near.ended ? offset : reach;
+#endif
+        if (!met) {
+            GridHit far = trace_grid(position + offset * normal, direction, level, start);
+            if (far.face != NO_FACE) {
+                radiance = texelFetch(face_radiance, face_texel(far.face), 0).rgb;
+                origins.g += 1.0;
+            }
+            else {
+                origins.b += 1.0;
+#ifdef WORLD
+                radiance = environment_radiance(direction);
+#endif
+            }
+        }
+        radiance = finite_radiance(radiance);
+        float luminance = dot(radiance, LUMINANCE);
+        sum += radiance;
+        sum_of_squares += luminance * luminance;
+    }
+    float count = float(gather_rays);
+    vec3 mean = sum / count;
+    float luminance = dot(mean, LUMINANCE);
+    float variance = max(sum_of_squares / count - luminance * luminance, 0.0) / max(count - 1.0, 1.0);
+    out_gathered = vec4(PI * mean, PI * PI * variance);
+#if defined(DEBUG_MARCH_HITS)
+    out_origin = vec4(vec3(marched / count), 1.0);
+#elif defined(DEBUG_LIGHT_ORIGIN)
+    out_origin = vec4(origins / count, 1.0);
+#elif defined(DEBUG_GRID_CELLS) || defined(DEBUG_GRID_RADIANCE)
+    int face = face_at(position - 0.5 * offset * normal, normal, level);
+#ifdef DEBUG_GRID_CELLS
+    vec2 random = hash_to_unit(uvec2(face, 0));
+    out_origin = face != NO_FACE ? vec4(random, hash_to_unit(uvec2(face, 1)).x, 1.0) : vec4(0.0);
+#else
+    out_origin = face != NO_FACE ? texelFetch(face_radiance, face_texel(face), 0) : vec4(0.0);
+#endif
+#endif
+}

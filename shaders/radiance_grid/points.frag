@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a point adds to its face: everything times the area that it stands for.
+
+#include "common/finite.glsl"
+#include "generated/GridPointsUniforms.glsl"
+#include "generated/MaterialUniforms.glsl"
+
+#ifdef TEXTURE
+uniform sampler2D base_color_texture;
+#endif
+
+flat in vec3 offset;
+flat in vec3 normal;
+flat in float area;
+#ifdef TEXTURE
+flat in vec2 uv;
+flat in float uv_scale;
+#endif
+#ifdef ATTRIBUTE
+flat in vec3 color;
+#endif
+#ifdef EMISSION
+flat in float glow;
+#endif
+
+#ifdef OCCUPANCY
+layout(location = 0) out float out_there;
+#else
+layout(location = 0) out vec4 sum_base_color;
+layout(location = 1) out vec4 sum_offset;
+layout(location = 2) out vec4 sum_normal;
+layout(location = 3) out vec4 sum_emission;
+#endif
+
+void main()
+{
+#ifdef ALPHA_TEST
+    if (material_emission.a * textureLod(base_color_texture, uv, 0.0).a < alpha_threshold)
+        discard;
+#endif
+#ifdef OCCUPANCY
+    out_there = 1.0;
+#else
+    vec3 base_color = material_base_color.rgb;
+#ifdef TEXTURE
+    // Texels as large as the surface that the point stands for.
+    float texels = uv_scale * point_spacing * float(max(textureSize(base_color_texture, 0).x,
+                                                        textureSize(base_color_texture, 0).y));
+    base_color *= textureLod(base_color_texture, uv, log2(max(texels, 1.0))).rgb;
+#endif
+#ifdef ATTRIBUTE
+    base_color *= color;
+#endif
+    vec3 emission = vec3(0.0);
+#ifdef EMISSION
+    emission = glow * finite_radiance(material_emission.rgb);
+#endif
+    sum_base_color = vec4(clamp(base_color, 0.0, LARGEST_REFLECTANCE), 1.0) * area;
+    sum_offset = vec4(offset, 0.0) * area;
+    sum_normal = vec4(normal, 0.0) * area;
+    sum_emission = vec4(emission, 0.0) * area;
+#endif
+}
