@@ -98,8 +98,13 @@ class Lighting:
 
     @property
     def world_factors(self) -> tuple[float, float]:
-        """On what the world causes by diffuse and by glossy reflection."""
-        return float(self._world.seen_by_diffuse), float(self._world.seen_by_glossy)
+        """On what the world causes by diffuse and by glossy reflection.
+
+        A preview has the world as if nothing were in front of it: where the indirect method finds the world, that would
+        be out of place beside it.
+        """
+        bare = self.preview and self.plan.world_gathered
+        return float(self._world.seen_by_diffuse), float(self._world.seen_by_glossy and not bare)
 
     @property
     def point_spacing(self) -> float:

@@ -180,7 +180,8 @@ def _bounced_lights(scene: Scene, settings: RenderSettings, indirect: IndirectNe
     if not indirect.reads_grid:
         return LightPlan()
     lights, _ = plan_lights(scene, settings, None, memory, continuous=False, world_gathered=True)
-    return replace(lights, world_directions=0, casts_shadows=any(batch.casts_shadow for batch in scene.batches))
+    casts = any(batch.casts_shadow for batch in scene.batches)
+    return replace(lights, world_directions=0, preview=False, casts_shadows=casts)
 
 
 def guarded(camera: Camera, settings: RenderSettings, guard_band: int) -> Camera:

@@ -32,6 +32,7 @@ _NEGATIVE_ONE_TO_ONE = 0x935E
 _TEXTURE_WRAP_S = 0x2802
 _TEXTURE_WRAP_T = 0x2803
 _MIRRORED_REPEAT = 0x8370
+_MAX = 0x8008
 
 _VERTEX_LAYER_EXTENSIONS = (
     "GL_ARB_shader_viewport_layer_array",
@@ -71,6 +72,7 @@ class RawGL:
         self._clear_buffer_fv = entry("glClearBufferfv", _uint, _int, ctypes.POINTER(ctypes.c_float))
         self._clear_buffer_uiv = entry("glClearBufferuiv", _uint, _int, ctypes.POINTER(_uint))
         self._sampler_parameter_i = entry("glSamplerParameteri", _uint, _uint, _int)
+        self._blend_equation_i = entry("glBlendEquationi", _uint, _uint)
         self._clip_control = (
             entry("glClipControl", _uint, _uint)
             if context.version_code >= 450 or "GL_ARB_clip_control" in context.extensions
@@ -145,6 +147,10 @@ class RawGL:
         """Let the vertex attribute at a location advance once every `divisor` instances."""
         self._bind_vertex_array(vertex_array.glo)
         self._vertex_attrib_divisor(location, divisor)
+
+    def blend_greatest(self, attachment: int) -> None:
+        """Let blending keep the greatest of what is drawn into one attachment, until `blend_equation` is set for all."""
+        self._blend_equation_i(attachment, _MAX)
 
     def mirror_repeat(self, sampler: moderngl.Sampler) -> None:
         """Let a sampler mirror its texture at every integer coordinate."""

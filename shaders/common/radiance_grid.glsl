@@ -3,14 +3,21 @@
 // six faces are kept, one for the surfaces whose normals are nearest to an axis; see render/grid/faces.py.
 // Positions are camera-relative, m. Uniforms: GRID_UNIFORMS in render/grid/textures.py.
 
+#include "radiance_grid/plane.glsl"
 #include "radiance_grid/table.glsl"
 
-uniform sampler2D face_planes;   // unit normal, and distance of the plane from the cell's centre along it, cells
+uniform usampler2D face_planes;
 
 const int NO_FACE = -1;
-// Rays may miss a plane's edge inside its cell by this part of it, or they would slip through between two planes that
-// were fitted to a curved surface.
+// Rays may miss a surface by this part of a cell, or they would slip through between two planes that were fitted to a
+// curved one.
 const float PLANE_TOLERANCE = 0.1;
+
+/** The plane of a face. */
+Plane fetch_plane(int face)
+{
+    return decode_plane(texelFetch(face_planes, face_texel(face), 0));
+}
 
 /** Side of a level's cells, m. */
 float grid_cell_size(int level)
@@ -86,11 +93,14 @@ GridHit trace_grid(vec3 origin, vec3 direction, int first_level, float start)
             // A loop in place of branches: drivers that draw on the CPU would run them for every step.
             for (; candidates != 0u; candidates &= candidates - 1u) {
                 int face = face_of(entry, findLSB(candidates));
-                vec4 plane = texelFetch(face_planes, face_texel(face), 0);
-                float approach = dot(plane.xyz, direction);
-                float meets = (plane.w - dot(plane.xyz, place - (vec3(cell) + 0.5))) / min(approach, -1e-6);
-                bool inside = meets >= max(t - PLANE_TOLERANCE, enter) && meets <= t_next + PLANE_TOLERANCE;
-                if (inside && approach < 0.0 && meets * cell_size < hit.distance)
+                Plane plane = fetch_plane(face);
+                vec3 from = place - (vec3(cell) + 0.5);
+                float approach = dot(plane.normal, direction);
+                float meets = (plane.distance - dot(plane.normal, from)) / min(approach, -1e-6);
+                vec3 point = from + meets * direction;
+                bool inside = all(greaterThanEqual(point, plane.low - PLANE_TOLERANCE))
+                              && all(lessThanEqual(point, plane.high + PLANE_TOLERANCE));
+                if (inside && approach < 0.0 && meets >= enter && meets * cell_size < hit.distance)
                     hit = GridHit(face, meets * cell_size);
             }
             bvec3 nearest = lessThanEqual(next, vec3(t_next));

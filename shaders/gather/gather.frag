@@ -40,15 +40,33 @@ int level_at(vec3 position)
     return level;
 }
 
-/** A face of the cell at a position, of the orientation nearest to a normal; NO_FACE where there is none. */
+/**
+ * The face that a surface belongs to, by its position and unit normal; NO_FACE where there is none.
+ *
+ * Rounding may put a surface on a cell's side into either cell: the one behind is asked first, then the one before.
+ */
 int face_at(vec3 position, vec3 normal, int level)
 {
-    ivec3 cell = ivec3(floor(grid_place(position, level)));
-    if (!grid_has(cell, level))
-        return NO_FACE;
-    uint entry = grid_entry(cell, level);
-    int orientation = orientation_of(normal);
-    return (entry >> uint(orientation) & 1u) != 0u ? face_of(entry, orientation) : NO_FACE;
+    int orientation = orientation_of(normal), face = NO_FACE;
+    for (float side = -0.125; side < 0.25 && face == NO_FACE; side += 0.25) {
+        ivec3 cell = ivec3(floor(grid_place(position, level) + side * normal));
+        uint entry = grid_has(cell, level) ? grid_entry(cell, level) : 0u;
+        if ((entry >> uint(orientation) & 1u) != 0u)
+            face = face_of(entry, orientation);
+    }
+    return face;
+}
+
+/** How far a surface is behind the plane of the face that it belongs to, along its unit normal, cells; at least 0. */
+float depth_behind_face(vec3 position, vec3 normal, int level)
+{
+    int face = face_at(position, normal, level);
+    if (face == NO_FACE)
+        return 0.0;
+    Plane plane = fetch_plane(face);
+    vec3 place = grid_place(position, level);
+    float height = dot(plane.normal, place - floor(place) - 0.5) - plane.distance;
+    return max(-height / max(dot(plane.normal, normal), 0.5), 0.0);
 }
 
 #ifdef CONTACT
@@ -58,7 +76,7 @@ vec3 layer_radiance(ivec3 texel, vec3 position, int level)
     vec3 normal = decode_octahedral(texelFetch(normal_layers, texel, 0).rg);
     float metallic = texelFetch(material_layers, texel, 0).r;
     vec3 albedo = texelFetch(base_color_layers, texel, 0).rgb * (1.0 - metallic);
-    int face = face_at(position - 0.5 * START_OFFSET * grid_cell_size(level) * normal, normal, level);
+    int face = face_at(position, normal, level);
     vec3 indirect = face != NO_FACE ? texelFetch(face_indirect, face_texel(face), 0).rgb : vec3(0.0);
     return texelFetch(radiance_layers, texel, 0).rgb + albedo / PI * indirect;
 }
@@ -78,13 +96,13 @@ void main()
     vec3 position = relative_position(center, view_depth);
     vec3 normal = decode_octahedral(texelFetch(normal_layers, ivec3(pixel, 0), 0).rg);
     int level = level_at(position);
-    float offset = START_OFFSET * grid_cell_size(level);
+    float offset = (START_OFFSET + depth_behind_face(position, normal, level)) * grid_cell_size(level);
     vec3 sum = vec3(0.0), origins = vec3(0.0);
     float sum_of_squares = 0.0, marched = 0.0;
     for (int ray = 0; ray < gather_rays; ++ray) {
         vec3 direction = cosine_direction(normal, ray_random(texel, ray, gather_rays));
         vec3 radiance = vec3(0.0);
-        float start = offset;
+        float start = 0.0;
         bool met = false;
 #ifdef CONTACT
         float jitter = ray_random(texel, ray, gather_rays).x;
@@ -96,7 +114,7 @@ void main()
             marched += 1.0;
             origins.r += 1.0;
         }
-        start = near.ended ? offset : reach;
+        start = near.ended ? 0.0 : reach;
 #endif
         if (!met) {
             GridHit far = trace_grid(position + offset * normal, direction, level, start);
@@ -126,7 +144,7 @@ void main()
 #elif defined(DEBUG_LIGHT_ORIGIN)
     out_origin = vec4(origins / count, 1.0);
 #elif defined(DEBUG_GRID_CELLS) || defined(DEBUG_GRID_RADIANCE)
-    int face = face_at(position - 0.5 * offset * normal, normal, level);
+    int face = face_at(position, normal, level);
 #ifdef DEBUG_GRID_CELLS
     vec2 random = hash_to_unit(uvec2(face, 0));
     out_origin = face != NO_FACE ? vec4(random, hash_to_unit(uvec2(face, 1)).x, 1.0) : vec4(0.0);

@@ -30,5 +30,5 @@ Face fetch_face(int face)
     vec3 offset = texelFetch(face_points, face_texel(face), 0).xyz;
     float size = grid_cell_size(level);
     vec3 position = grid_origins[level].xyz + (cell + 0.5 + offset) * size;
-    return Face(level, int(place.y & 7u), position, texelFetch(face_planes, face_texel(face), 0).xyz, size);
+    return Face(level, int(place.y & 7u), position, fetch_plane(face).normal, size);
 }

@@ -18,8 +18,8 @@ void main()
     shading.view = lit_face.normal;
     shading.surface = make_surface(vec3(1.0), 0.0, 0.0, 1.0, 0.0, 1.0);
     shading.world_surface = shading.surface;
-    shading.position = lit_face.position + START_OFFSET * lit_face.cell * lit_face.normal;
-    shading.precision_along_view = 0.0;
+    shading.position = lit_face.position;
+    shading.precision_along_view = START_OFFSET * lit_face.cell; // what is nearer than that casts no shadow on it
     shading.link_group = 0;
     shading.random = vec2(0.5);
     out_direct = vec4(finite_radiance(share * PI * lit(shading).diffuse), 0.0);

@@ -13,5 +13,5 @@ void main()
     Face from = fetch_face(face);
     vec3 direction = ray_direction(from, texelFetch(face_places, face_texel(face), 0).rg, ray);
     vec3 origin = from.position + START_OFFSET * from.cell * from.normal;
-    out_link = uint(trace_grid(origin, direction, from.level, START_OFFSET * from.cell).face + 1);
+    out_link = uint(trace_grid(origin, direction, from.level, 0.0).face + 1);
 }

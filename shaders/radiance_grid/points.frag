@@ -30,6 +30,8 @@ layout(location = 0) out vec4 sum_base_color;
 layout(location = 1) out vec4 sum_offset;
 layout(location = 2) out vec4 sum_normal;
 layout(location = 3) out vec4 sum_emission;
+layout(location = 4) out vec4 most;     // these two keep the greatest
+layout(location = 5) out vec4 least;
 #endif
 
 void main()
@@ -59,5 +61,7 @@ void main()
     sum_offset = vec4(offset, 0.0) * area;
     sum_normal = vec4(normal, 0.0) * area;
     sum_emission = vec4(emission, 0.0) * area;
+    most = vec4(0.5 + offset, 0.0);
+    least = vec4(0.5 - offset, 0.0);
 #endif
 }

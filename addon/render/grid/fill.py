@@ -26,7 +26,16 @@ from ..uniforms import UniformBlock
 from .faces import ORIENTATIONS, number_faces
 from .levels import GridLevel
 from .points import POINTS_PER_CELL, SurfacePoints, surface_points
-from .textures import ACCUMULATED, FACE_UNIFORMS, GRID_DEFINES, FaceDraw, GridTextures, face_program, face_uniforms
+from .textures import (
+    ADDED_UP,
+    FACE_UNIFORMS,
+    GREATEST,
+    GRID_DEFINES,
+    FaceDraw,
+    GridTextures,
+    face_program,
+    face_uniforms,
+)
 
 GRID_POINTS_UNIFORMS = UniformBlock(
     "GridPointsUniforms",
@@ -45,6 +54,9 @@ GRID_POINTS_UNIFORMS = UniformBlock(
 
 LARGEST_REFLECTANCE = 0.999
 """A surface that sends back all light or more would never come to rest."""
+
+_PLANE_DEFINES = frozenset({f"HALF_SPACING {0.5 / sqrt(POINTS_PER_CELL)}"})
+"""Cells that a surface goes on beyond its outermost point, on average."""
 
 _OCCUPANCY_WIDTH = 4096
 _POINTS_BINDING, _MATERIAL_BINDING = 0, 1
@@ -118,18 +130,21 @@ class GridFill:
         self, frame: Frame, draws: tuple[Draw, ...], textures: GridTextures, sampled: Mapping[str, MeshLight]
     ) -> None:
         context = self._device.context
-        framebuffer = textures.framebuffer(*(f"sum_{name}" for name in ACCUMULATED))
+        framebuffer = textures.framebuffer(*ADDED_UP, *GREATEST)
         framebuffer.viewport = (0, 0, *framebuffer.size)
         framebuffer.use()
         framebuffer.clear()
         context.enable_only(moderngl.BLEND)
         context.blend_func = moderngl.ONE, moderngl.ONE
+        for index in range(len(GREATEST)):
+            self._device.raw.blend_greatest(len(ADDED_UP) + index)
         bottom = 0
         for level in textures.levels:
             for draw in draws:
                 glow = unsampled_emission(frame.scene, draw, sampled)
                 self._draw(frame, draw, level, "", framebuffer.size, bottom, glow, textures.cells)
             bottom += level.size[2]
+        context.blend_equation = moderngl.FUNC_ADD  # of every attachment
         context.enable_only(moderngl.NOTHING)
 
     def _draw(
@@ -215,8 +230,8 @@ class GridFill:
         return _PointBuffers(points, held)
 
     def _find_planes(self, textures: GridTextures) -> None:
-        sums = tuple(f"sum_{name}" for name in ACCUMULATED)
-        spec = self._planes.spec("radiance_grid/planes.frag", samplers=sums)
+        sums = (*ADDED_UP, *GREATEST)
+        spec = self._planes.spec("radiance_grid/planes.frag", _PLANE_DEFINES, sums)
         for unit, name in enumerate(sums):
             textures.texture(name).use(unit)
         framebuffer = textures.framebuffer("planes", "points", "albedo", "emission")
@@ -237,7 +252,7 @@ def points_program(defines: frozenset[str]) -> ProgramSpec:
 
 def fill_variants() -> Iterator[ProgramSpec]:
     """Every program that fills the grid."""
-    yield face_program("radiance_grid/planes.frag", (FACE_UNIFORMS,), frozenset(), ())
+    yield face_program("radiance_grid/planes.frag", (FACE_UNIFORMS,), _PLANE_DEFINES, ())
     for surface, purpose in product(SURFACES, ((), ("OCCUPANCY",), ("EMISSION",))):
         yield points_program(surface | frozenset(purpose))
 

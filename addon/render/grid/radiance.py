@@ -13,7 +13,6 @@ from ..device import Device
 from ..direct_needs import LIGHT_DEFINES, direct_needs, direct_program_defines
 from ..environment import ENVIRONMENT_DEFINE, ENVIRONMENT_SAMPLERS, ENVIRONMENT_UNIFORMS, environment_uniforms
 from ..lighting import Lighting
-from ..lighting_plan import LightPlan
 from ..passes.base import Frame
 from ..passes.direct import (
     DIRECT_SAMPLERS,
@@ -39,8 +38,9 @@ that lies up to half a cell before and behind its plane, a quarter on average.""
 
 _DEFINES = frozenset({f"START_OFFSET {START_OFFSET}"})
 _FACE_NEEDS = (*LIGHT_DEFINES[:-1], "SPOT_CONES", "SHADOWS")
-_SURFACE_POINTS = 4
-"""Points that each emissive surface is sampled at."""
+_LIGHT_POINTS = 4
+"""Points that each light is sampled at. Closed forms with soft shadows, as previews have them, would be smoother, but let
+too much light of large lamps past what stands near these."""
 
 _TEXELS_PER_CELL = 4
 _CHECKED_BOUNCES = 8
@@ -62,32 +62,26 @@ class GridRadiance:
 
     def __init__(self, device: Device) -> None:
         self._device = device
-        self._lamps = _FaceLights(device)
-        self._surfaces = _FaceLights(device)
+        self._lights = _FaceLights(device)
         self._light = FaceDraw(device, DIRECT_UNIFORMS, FACE_UNIFORMS)
         self._shine = FaceDraw(device, FACE_UNIFORMS, SKY_UNIFORMS)
         self._bounce = FaceDraw(device, FACE_UNIFORMS)
 
     def light(self, frame: Frame, grid: GridTextures) -> None:
-        """Find every face's irradiance by what is sampled as lights: lamps whole, emissive surfaces at some points."""
-        lights = frame.plan.bounced_lights
+        """Find every face's irradiance by lamps and emissive surfaces, each by a few of its points."""
         context = self._device.context
         target = grid.framebuffer("direct")
         target.viewport = (0, 0, *target.size)
         target.use()
         target.clear()
-        for phase, plan, samples in (
-            (self._lamps, replace(lights, mesh_lights=(), preview=True), 1),
-            (self._surfaces, replace(lights, lights=(), reach=(), preview=False), _SURFACE_POINTS),
-        ):
-            if plan.count == 0:
-                continue
-            phase.begin(frame, grid, plan, samples)
-            for sample in range(samples):
-                lit = phase.at_sample(sample)
-                context.enable_only(moderngl.BLEND)
-                context.blend_func = moderngl.ONE, moderngl.ONE
-                self._draw_light(lit, grid, 1.0 / samples)
+        if frame.plan.bounced_lights.count == 0:
+            return
+        self._lights.begin(frame, grid)
+        for sample in range(_LIGHT_POINTS):
+            lit = self._lights.at_sample(sample)
+            context.enable_only(moderngl.BLEND)
+            context.blend_func = moderngl.ONE, moderngl.ONE
+            self._draw_light(lit, grid, 1.0 / _LIGHT_POINTS)
         context.enable_only(moderngl.NOTHING)
 
     def link(self, frame: Frame, grid: GridTextures) -> None:
@@ -138,7 +132,7 @@ class GridRadiance:
 
     def release(self) -> None:
         """Free everything."""
-        for item in (self._lamps, self._surfaces, self._light, self._shine, self._bounce):
+        for item in (self._lights, self._light, self._shine, self._bounce):
             item.release()
 
     def _draw_light(self, frame: Frame, grid: GridTextures, share: float) -> None:
@@ -186,11 +180,14 @@ class _FaceLights:
         self._shadows = _GridShadowMaps(device)
         self._frame: Frame | None = None
 
-    def begin(self, frame: Frame, grid: GridTextures, plan: LightPlan, samples: int) -> None:
-        """Look at the lights of a plan."""
+    def begin(self, frame: Frame, grid: GridTextures) -> None:
+        """Look at the lights that the plan has for the grid."""
+        plan = frame.plan.bounced_lights
         largest = _TEXELS_PER_CELL * max(grid.levels[0].size)
         size = min(1 << max(largest - 1, 1).bit_length(), frame.settings.shadow_map_size)
-        settings = replace(frame.settings, samples=samples, shadow_map_size=size, shading_model=ShadingModel.PHYSICAL)
+        settings = replace(
+            frame.settings, samples=_LIGHT_POINTS, shadow_map_size=size, shading_model=ShadingModel.PHYSICAL
+        )
         self._lighting.begin(frame.scene, settings, plan, frame.view.position)
         self._shadows.receivers = grid_receivers(grid)
         self._frame = replace(

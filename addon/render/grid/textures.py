@@ -46,13 +46,16 @@ REACH = 24.0
 """Cells that a ray goes through a level: then those of the next one, twice as large, are seen under as small an angle
 from where it began as the first were from a twelfth of the way."""
 
-ACCUMULATED = ("base_color", "offset", "normal", "emission")
+ADDED_UP = ("sum_base_color", "sum_offset", "sum_normal", "sum_emission")
 """What is added up of a face's points, each times the area it stands for; the first has the area's sum as alpha."""
+
+GREATEST = ("most", "least")
+"""The greatest of ½ plus and of ½ minus the points' offsets from the cell's centre, cells."""
 
 _FLOATS = 4
 _FACE_TEXTURES = (
-    *(f"sum_{name}" for name in ACCUMULATED),
-    "planes",
+    *ADDED_UP,
+    *GREATEST,
     "points",
     "albedo",
     "emission",
@@ -63,7 +66,7 @@ _FACE_TEXTURES = (
     "next_indirect",
     "next_radiance",
 )
-BYTES_PER_FACE = 4 * _FLOATS * len(_FACE_TEXTURES) + 8
+BYTES_PER_FACE = 4 * _FLOATS * (len(_FACE_TEXTURES) + 1) + 8
 """Without the rays from cell to cell, which take 4 bytes each."""
 
 
@@ -83,6 +86,7 @@ class GridTextures:
         self.places = context.texture(size, 2, places, dtype="u4")
         self.places.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._faces = {name: context.texture(size, _FLOATS, dtype="f4") for name in _FACE_TEXTURES}
+        self._faces["planes"] = context.texture(size, _FLOATS, dtype="u4")
         for texture in self._faces.values():
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self.links = context.texture_array((*size, cell_rays), 1, dtype="u4")
@@ -97,7 +101,7 @@ class GridTextures:
             raise
 
     def texture(self, name: str) -> moderngl.Texture:
-        """One of the faces' textures: RGBA32F, `FACES_PER_ROW` texels wide."""
+        """One of the faces' textures, `FACES_PER_ROW` texels wide: RGBA32F, "planes" RGBA32UI."""
         return self._faces[name]
 
     def exchange(self, *names: str) -> None:

@@ -3,14 +3,21 @@
 
 from .base import Frame, Pass
 from .composite import CompositePass
+from .deep_march import DeepMarchPass
 from .depth_tiles import DepthTilesPass
 from .direct import DirectPass
 from .exit import ExitPass
+from .filter import FilterPass
+from .gather import GatherPass
 from .gbuffer import GBufferPass
 from .gouraud import GouraudPass
 from .light_tiles import LightTilesPass
+from .occlusion import OcclusionPass
 from .oracle import OraclePass
+from .radiance_grid import RadianceGridPass
+from .radiosity import RadiosityPass
 from .shadow_maps import ShadowMapsPass
+from .temporal import TemporalPass
 
 PASSES: tuple[type[Pass], ...] = (
     OraclePass,
@@ -21,6 +28,13 @@ PASSES: tuple[type[Pass], ...] = (
     LightTilesPass,
     DirectPass,
     GouraudPass,
+    OcclusionPass,
+    RadiosityPass,
+    DeepMarchPass,
+    RadianceGridPass,
+    GatherPass,
+    TemporalPass,
+    FilterPass,
     CompositePass,
 )
 
