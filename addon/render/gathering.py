@@ -7,7 +7,7 @@ A pass adds `GATHER_UNIFORMS` to its block and includes `common/gather.glsl`.
 import numpy as np
 
 from .passes.base import Frame
-from .sampling import sequence_point
+from .sampling import pixel_shift
 
 GATHER_UNIFORMS = (
     ("gather_offset", "vec2"),  # pixels from the lower left of those that share a texel to the one that it is found for
@@ -22,7 +22,7 @@ def gather_uniforms(frame: Frame) -> dict[str, object]:
     indirect, index = frame.settings.indirect, frame.sample.index
     return {
         "gather_offset": gather_offset(indirect.divisor, index),
-        "gather_shift": sequence_point(index, frame.settings.seed),
+        "gather_shift": pixel_shift(index + frame.picture, frame.settings.seed),
         "gather_divisor": indirect.divisor,
         "gather_rays": indirect.rays,
     }

@@ -32,11 +32,8 @@ FILTER_SCRATCH = ("filter.scratch_0", "filter.scratch_1")
 ORIGIN_TARGET = "indirect.origin"
 """What debug views of indirect light show."""
 
-BOUNCE_TARGETS = ("deep_march.bounce_0", "deep_march.bounce_1")
+BOUNCE_TARGETS = ("indirect.bounce_0", "indirect.bounce_1")
 """Irradiance (W/m²) of all layers after one bounce and after the next, in turn."""
-
-RADIOSITY_TARGETS = ("radiosity.bounce_0", "radiosity.bounce_1")
-"""Radiance (W/(sr·m²)) of all layers after one bounce and after the next, in turn."""
 
 BOUNCE_DIVISOR = 8
 """Pixels along each side of those that share an irradiance there."""
@@ -169,17 +166,15 @@ def plan_indirect(
 
 
 _OCCLUSIONS = (IndirectMethod.OCCLUSION, IndirectMethod.SSAO)
+_BOUNCING = (IndirectMethod.DEEP_MARCH, IndirectMethod.RADIOSITY)
+"""Methods whose light bounces from layer to layer."""
 
 
 def _bounce_targets(indirect: IndirectSettings, needs: IndirectNeeds) -> tuple[TargetSpec, ...]:
     """What further bounces through the layers are kept in."""
-    if indirect.bounces == 1:
+    if needs.method not in _BOUNCING or indirect.bounces == 1:
         return ()
-    if needs.method is IndirectMethod.DEEP_MARCH:
-        return tuple(TargetSpec(name, 4, "f4", needs.layers, divisor=BOUNCE_DIVISOR) for name in BOUNCE_TARGETS)
-    if needs.method is IndirectMethod.RADIOSITY:
-        return tuple(TargetSpec(name, 4, "f4", needs.layers, divisor=indirect.divisor) for name in RADIOSITY_TARGETS)
-    return ()
+    return tuple(TargetSpec(name, 4, "f4", needs.layers, divisor=BOUNCE_DIVISOR) for name in BOUNCE_TARGETS)
 
 
 def _method_defines(scene: Scene, settings: RenderSettings, needs: IndirectNeeds) -> frozenset[str]:

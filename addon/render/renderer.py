@@ -48,6 +48,7 @@ class Renderer:
         self._camera: Camera | None = None
         self._first_sample: dict[Channel, Float32Array] = {}
         self._layers: tuple[LayerImages, ...] = ()
+        self._pictures = 0
         self._upload_seconds = 0.0
         self._warnings: tuple[str, ...] = ()
 
@@ -97,7 +98,9 @@ class Renderer:
             history=frames.history,
             ahead=frames.ahead,
             continuous=sequence.continuous,
+            picture=self._pictures,
         )
+        self._pictures += sequence.continuous
         self._prepare_passes(self._frame)
         self._oracle = oracle
         return planned

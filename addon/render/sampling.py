@@ -37,9 +37,13 @@ def sequence_point(index: int, seed: int) -> tuple[float, float]:
     """
     if index == 0:
         return (0.5, 0.5)
-    start = int(np.random.default_rng(seed).integers(1 << 24)) if seed else 0
-    point = np.modf(0.5 + (start + index) * _kronecker_steps())[0]
+    point = np.modf(0.5 + (_start(seed) + index) * _kronecker_steps())[0]
     return (float(point[0]), float(point[1]))
+
+
+def _start(seed: int) -> int:
+    """Where the sequences of a seed begin."""
+    return int(np.random.default_rng(seed).integers(1 << 24)) if seed else 0
 
 
 @lru_cache(maxsize=1)
@@ -67,8 +71,8 @@ def _blackman_harris_cdf() -> tuple[Float64Array, Float64Array]:
     return cumulative / cumulative[-1], offsets
 
 
-def pixel_shift(index: int) -> tuple[float, float]:
+def pixel_shift(index: int, seed: int = 0) -> tuple[float, float]:
     """(x, y) in [0, 1) by which the random numbers of all pixels differ in sample `index`: other steps than
     `sequence_point`'s, the square roots of 2 and 3."""
-    x, y = np.modf(index * np.sqrt([2.0, 3.0]))[0]
+    x, y = np.modf((_start(seed) + index) * np.sqrt([2.0, 3.0]))[0]
     return float(x), float(y)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Light that faces get from others by one more bounce: what their rays met last time sends as much as it did then.
+// Light that faces get from others by one more bounce: what their rays meet sends what it was found to reflect before.
 
 #include "common/constants.glsl"
 #include "common/finite.glsl"
@@ -7,13 +7,12 @@
 
 uniform usampler2DArray face_links;
 uniform sampler2D face_albedo;
-uniform sampler2D face_emission;
 uniform sampler2D face_direct;
-uniform sampler2D face_sky;
+uniform sampler2D face_first;
 uniform sampler2D face_radiance;
 
 layout(location = 0) out vec4 out_indirect; // irradiance by world and other faces, W/m²
-layout(location = 1) out vec4 out_radiance; // W/(sr·m²)
+layout(location = 1) out vec4 out_radiance; // that is reflected, W/(sr·m²)
 
 void main()
 {
@@ -27,8 +26,8 @@ void main()
         vec3 radiance = texelFetch(face_radiance, face_texel(int(max(link, 1u)) - 1), 0).rgb;
         sum += link != 0u ? radiance : vec3(0.0);
     }
-    vec3 indirect = texelFetch(face_sky, texel, 0).rgb + sum * (PI / float(max(ray_count, 1)));
+    vec3 indirect = texelFetch(face_first, texel, 0).rgb + sum * (PI / float(max(ray_count, 1)));
     vec3 reflected = texelFetch(face_albedo, texel, 0).rgb / PI * (texelFetch(face_direct, texel, 0).rgb + indirect);
     out_indirect = vec4(finite_radiance(indirect), 0.0);
-    out_radiance = vec4(finite_radiance(texelFetch(face_emission, texel, 0).rgb + reflected), 0.0);
+    out_radiance = vec4(finite_radiance(reflected), 0.0);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The finest faces' light: their own direct light, and the rest from the faces of the next level around them. Other
-// faces keep theirs.
+// What rays that are sent from pixels see. The finest faces get their own direct light, and the rest from the faces of
+// the next level around them; other faces keep what was found. Emission is added to both.
 
 #include "common/constants.glsl"
 #include "common/finite.glsl"
@@ -46,14 +46,15 @@ void main()
     if (face < first_face || face >= end_face)
         discard;
     ivec2 texel = face_texel(face);
+    vec3 emission = texelFetch(face_emission, texel, 0).rgb;
     Face own = fetch_face(face);
     if (own.level > 0) {
         out_indirect = texelFetch(face_indirect, texel, 0);
-        out_radiance = texelFetch(face_radiance, texel, 0);
+        out_radiance = vec4(finite_radiance(emission + texelFetch(face_radiance, texel, 0).rgb), 0.0);
         return;
     }
     vec3 indirect = coarser_indirect(own);
     vec3 reflected = texelFetch(face_albedo, texel, 0).rgb / PI * (texelFetch(face_direct, texel, 0).rgb + indirect);
     out_indirect = vec4(finite_radiance(indirect), 0.0);
-    out_radiance = vec4(finite_radiance(texelFetch(face_emission, texel, 0).rgb + reflected), 0.0);
+    out_radiance = vec4(finite_radiance(emission + reflected), 0.0);
 }

@@ -12,7 +12,17 @@ MOST_LEVELS = 6
 """Each has cells twice as large as the one before."""
 
 _MOST_CELLS = 160
-"""Cells along each side of a level at most."""
+"""Cells along each side of a level that covers the scene at most."""
+
+_SPREAD = 1.25
+"""Sides of other levels over that of what is seen, which is within the finest."""
+
+_FARTHEST = 1e9
+"""Cells from the world's origin: beyond, a float64 no longer tells positions inside a cell apart as well as a float32."""
+
+_SHIFT = (0.3819660112501051, 0.2763932022500210, 0.1458980337503155)
+"""Of the lattice against the world's origin, cells: things are modelled at round numbers, where a surface on the border
+of two cells would be in either of them by rounding."""
 
 _SNAP = 8
 """A level that does not cover the scene moves by so many of its cells at a time."""
@@ -28,7 +38,7 @@ BYTES_PER_CELL = 4
 class GridLevel:
     """A box of cubic cells aligned with the world's axes.
 
-    `lowest` (3,) int64: its lowest cell, counted in cells from the world's origin. `size` (3,): cells along each side.
+    `lowest` (3,): its lowest cell, counted in cells from about the world's origin. `size` (3,): cells along each side.
     `cell` (m): a cell's side.
     """
 
@@ -39,7 +49,7 @@ class GridLevel:
     @property
     def origin(self) -> Float64Array:
         """(3,) its lowest corner, world space."""
-        return np.array(self.lowest, np.float64) * self.cell
+        return (np.array(self.lowest, np.float64) + _SHIFT) * self.cell
 
     @property
     def bounds(self) -> Float64Array:
@@ -63,37 +73,41 @@ def cell_size(seen: Float64Array, cells: int) -> float:
     return 2.0 ** (ceil(_STEPS_PER_OCTAVE * log2(side / cells)) / _STEPS_PER_OCTAVE)
 
 
-def grid_levels(bounds: Float64Array, center: Float64Array, cell: float, memory: int) -> tuple[GridLevel, ...]:
+def grid_levels(
+    bounds: Float64Array, center: Float64Array, cell: float, cells: int, memory: int
+) -> tuple[GridLevel, ...]:
     """Levels from the finest to one that covers the scene's `bounds` (2, 3), as far as `MOST_LEVELS` go; at least two.
 
-    A level that cannot cover the scene is about `center` (3,). `cell` (m) of the finest. `memory`: bytes that the
-    tables of all levels' cells may take; where that is too little, cells are larger.
+    `center` (3,) of what is seen, along which there are about `cells` of the finest, `cell` m large: levels that cannot
+    cover the scene are about it. `memory`: bytes that the tables of all levels' cells may take; where that is too
+    little, cells are larger.
     """
+    span = min(max(int(_SPREAD * cells), 2 * _SNAP), _MOST_CELLS)
     while True:
-        levels = _levels(bounds, center, cell)
+        levels = _levels(bounds, center, cell, span)
         if BYTES_PER_CELL * sum(level.count for level in levels) <= memory or levels[0].count <= 8:
             return levels
         cell *= 2.0 ** (1.0 / _STEPS_PER_OCTAVE)
 
 
-def _levels(bounds: Float64Array, center: Float64Array, cell: float) -> tuple[GridLevel, ...]:
+def _levels(bounds: Float64Array, center: Float64Array, cell: float, span: int) -> tuple[GridLevel, ...]:
     levels: list[GridLevel] = []
     for index in range(MOST_LEVELS):
-        level, covers = _level(bounds, center, cell * 2.0**index)
+        level, covers = _level(bounds, center, cell * 2.0**index, span)
         levels.append(level)
         if covers and index > 0:
             break
     return tuple(levels)
 
 
-def _level(bounds: Float64Array, center: Float64Array, cell: float) -> tuple[GridLevel, bool]:
+def _level(bounds: Float64Array, center: Float64Array, cell: float, span: int) -> tuple[GridLevel, bool]:
     """A level, and whether it covers the scene: with a cell to spare on each side, for surfaces on a cell's side."""
-    low = np.floor(bounds[0] / cell).astype(np.int64) - 1
-    high = np.floor(bounds[1] / cell).astype(np.int64) + 2
-    near = _SNAP * np.floor(center / (_SNAP * cell) + 0.5).astype(np.int64)
-    covered = high - low <= _MOST_CELLS
-    low = np.where(covered, low, np.maximum(low, near - _MOST_CELLS // 2))
-    high = np.where(covered, high, np.minimum(high, near + _MOST_CELLS // 2))
+    ends = np.clip(np.concatenate([bounds, [center]]) / cell - _SHIFT, -_FARTHEST, _FARTHEST)
+    low, high, middle = np.floor(np.nan_to_num(ends)).astype(np.int64)
+    low, high, near = low - 1, high + 2, _SNAP * (middle // _SNAP) + _SNAP // 2
+    covered = bool((high - low <= _MOST_CELLS).all())
+    if not covered:
+        low, high = np.maximum(low, near - span // 2), np.minimum(high, near + span // 2)
     size = np.maximum(high - low, 1)
     lowest = (int(low[0]), int(low[1]), int(low[2]))
-    return GridLevel(lowest, (int(size[0]), int(size[1]), int(size[2])), cell), bool(covered.all())
+    return GridLevel(lowest, (int(size[0]), int(size[1]), int(size[2])), cell), covered

@@ -51,10 +51,16 @@ _MOST_BOUNCES = 1024
 
 _FACE_SAMPLERS = ("grid_cells", "face_planes", "face_points", "face_places")
 _LIGHT_SAMPLERS = (*_FACE_SAMPLERS, *DIRECT_SAMPLERS, "ltc_table", "ggx_albedo_table")
-_SKY_SAMPLERS = (*_FACE_SAMPLERS, "face_links", *ENVIRONMENT_SAMPLERS)
-_TOTALS = ("face_albedo", "face_emission", "face_direct")
-_BOUNCE_SAMPLERS = (*_FACE_SAMPLERS, *_TOTALS, "face_links", "face_sky", "face_radiance")
-_CARRY_SAMPLERS = (*_FACE_SAMPLERS, *_TOTALS, "face_indirect", "face_radiance")
+_FIRST_SAMPLERS = (*_FACE_SAMPLERS, "face_links", "face_emission", *ENVIRONMENT_SAMPLERS)
+_BOUNCE_SAMPLERS = (*_FACE_SAMPLERS, "face_albedo", "face_direct", "face_links", "face_first", "face_radiance")
+_CARRY_SAMPLERS = (
+    *_FACE_SAMPLERS,
+    "face_albedo",
+    "face_direct",
+    "face_emission",
+    "face_indirect",
+    "face_radiance",
+)
 
 
 class GridRadiance:
@@ -64,7 +70,7 @@ class GridRadiance:
         self._device = device
         self._lights = _FaceLights(device)
         self._light = FaceDraw(device, DIRECT_UNIFORMS, FACE_UNIFORMS)
-        self._shine = FaceDraw(device, FACE_UNIFORMS, SKY_UNIFORMS)
+        self._first = FaceDraw(device, FACE_UNIFORMS, SKY_UNIFORMS)
         self._bounce = FaceDraw(device, FACE_UNIFORMS)
 
     def light(self, frame: Frame, grid: GridTextures) -> None:
@@ -94,24 +100,20 @@ class GridRadiance:
             uniforms = face_uniforms(grid.levels, frame.view.position, faces, ray=ray, ray_count=grid.cell_rays)
             self._bounce.draw(spec, grid.link_framebuffer(ray), faces, uniforms)
 
-    def shine(self, frame: Frame, grid: GridTextures) -> None:
-        """Find the coarse faces' irradiance by the world, past what their rays met."""
-        world = frame.scene.world
-        target = grid.framebuffer("sky")
-        target.viewport = (0, 0, *target.size)
-        target.use()
-        target.clear()
-        if not frame.plan.indirect.world_gathered:
-            return
-        defines = frozenset({ENVIRONMENT_DEFINE} if world.environment is not None else ())
-        spec = self._shine.spec("radiance_grid/sky.frag", defines | _DEFINES, _SKY_SAMPLERS)
+    def meet_first(self, frame: Frame, grid: GridTextures) -> None:
+        """Find the coarse faces' irradiance by emission and by the world."""
+        world, defines = frame.scene.world, set[str]()
+        if frame.plan.indirect.world_gathered:
+            defines |= {"WORLD", ENVIRONMENT_DEFINE} if world.environment is not None else {"WORLD"}
+        target = grid.framebuffer("first")
+        spec = self._first.spec("radiance_grid/first.frag", frozenset(defines) | _DEFINES, _FIRST_SAMPLERS)
         self._bind_faces(spec, grid)
         grid.links.use(spec.samplers.index("face_links"))
-        if world.environment is not None:
+        if ENVIRONMENT_DEFINE in defines and world.environment is not None:
             frame.environment.bind(world.environment, spec)
         faces = (grid.faces.first[1], grid.faces.count)
         uniforms = face_uniforms(grid.levels, frame.view.position, faces, ray_count=grid.cell_rays)
-        self._shine.draw(spec, target, faces, uniforms, environment_uniforms(world))
+        self._first.draw(spec, target, faces, uniforms, environment_uniforms(world))
 
     def bounce(self, frame: Frame, grid: GridTextures) -> None:
         """Let light bounce between the coarse faces as often as the settings say, and carry it to the finest ones."""
@@ -132,7 +134,7 @@ class GridRadiance:
 
     def release(self) -> None:
         """Free everything."""
-        for item in (self._lights, self._light, self._shine, self._bounce):
+        for item in (self._lights, self._light, self._first, self._bounce):
             item.release()
 
     def _draw_light(self, frame: Frame, grid: GridTextures, share: float) -> None:
@@ -264,7 +266,8 @@ def radiance_variants() -> Iterator[ProgramSpec]:
         defines = wanted - {"WORLD", "ENVIRONMENT", "EMISSION", "SPLIT"} | DIRECT_SIZES | _DEFINES
         yield face_program("radiance_grid/light.frag", (DIRECT_UNIFORMS, FACE_UNIFORMS), defines, _LIGHT_SAMPLERS)
     yield face_program("radiance_grid/links.frag", (FACE_UNIFORMS,), _DEFINES, _FACE_SAMPLERS)
-    for world in (frozenset[str](), frozenset({ENVIRONMENT_DEFINE})):
-        yield face_program("radiance_grid/sky.frag", (FACE_UNIFORMS, SKY_UNIFORMS), world | _DEFINES, _SKY_SAMPLERS)
+    for world in (frozenset[str](), frozenset({"WORLD"}), frozenset({"WORLD", ENVIRONMENT_DEFINE})):
+        blocks = (FACE_UNIFORMS, SKY_UNIFORMS)
+        yield face_program("radiance_grid/first.frag", blocks, world | _DEFINES, _FIRST_SAMPLERS)
     yield face_program("radiance_grid/bounce.frag", (FACE_UNIFORMS,), frozenset(), _BOUNCE_SAMPLERS)
     yield face_program("radiance_grid/carry.frag", (FACE_UNIFORMS,), frozenset(), _CARRY_SAMPLERS)

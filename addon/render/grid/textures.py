@@ -42,9 +42,9 @@ FACE_UNIFORMS = UniformBlock(
 GRID_DEFINES = frozenset({f"FACES_PER_ROW {FACES_PER_ROW}"})
 """Defines that `common/radiance_grid.glsl` needs."""
 
-REACH = 24.0
-"""Cells that a ray goes through a level: then those of the next one, twice as large, are seen under as small an angle
-from where it began as the first were from a twelfth of the way."""
+REACH = 8.0
+"""Cells that a ray goes through a level before it changes to the next. Measured at 4, 8, 16, 24 and without end: Sponza's
+FLIP .093, .093, .094, .097, .099, Cornell's .072 throughout, and longer ones take more time."""
 
 ADDED_UP = ("sum_base_color", "sum_offset", "sum_normal", "sum_emission")
 """What is added up of a face's points, each times the area it stands for; the first has the area's sum as alpha."""
@@ -60,7 +60,7 @@ _FACE_TEXTURES = (
     "albedo",
     "emission",
     "direct",
-    "sky",
+    "first",
     "indirect",
     "radiance",
     "next_indirect",

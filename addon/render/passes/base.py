@@ -49,7 +49,7 @@ class Frame:
     `previous`: the frame before. `history`: what a final render draws its oracle from, if not from the frame itself.
     `ahead`: the next picture as far as it is known or predicted, None where that is the next sample.
     `continuous`: as in `Sequence`. `drift`: what `drift_since` found. `shadows`: this sample's maps, if it has any.
-    `grid`: the radiance grid, where there is one.
+    `grid`: the radiance grid, where there is one. `picture`: how many pictures a viewport showed before; 0 elsewhere.
     """
 
     device: Device
@@ -76,6 +76,7 @@ class Frame:
     drift: float | None = None
     shadows: ShadowTextures | None = None
     grid: "GridTextures | None" = None
+    picture: int = 0
 
     @property
     def moment(self) -> Moment:

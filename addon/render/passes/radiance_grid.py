@@ -63,7 +63,7 @@ class RadianceGridPass:
             self._lit = ()
         if not _same(self._lit, lit):
             self._radiance.light(frame, self._grid)
-            self._radiance.shine(frame, self._grid)
+            self._radiance.meet_first(frame, self._grid)
             self._radiance.bounce(frame, self._grid)
             self._lit = lit
         frame.grid = self._grid
@@ -88,7 +88,7 @@ def _levels(frame: Frame) -> tuple[GridLevel, ...]:
     if seen is None:
         seen = bounds
     cell = indirect.cell_size or cell_size(seen, indirect.cells)
-    return grid_levels(bounds, seen.mean(axis=0), cell, indirect.grid_memory << 20)
+    return grid_levels(bounds, seen.mean(axis=0), cell, indirect.cells, indirect.grid_memory << 20)
 
 
 def _seen_box(frame: Frame) -> Float64Array | None:
