@@ -33,6 +33,7 @@ _TEXTURE_WRAP_S = 0x2802
 _TEXTURE_WRAP_T = 0x2803
 _MIRRORED_REPEAT = 0x8370
 _MAX = 0x8008
+_FUNC_ADD = 0x8006
 
 _VERTEX_LAYER_EXTENSIONS = (
     "GL_ARB_shader_viewport_layer_array",
@@ -72,6 +73,7 @@ class RawGL:
         self._clear_buffer_fv = entry("glClearBufferfv", _uint, _int, ctypes.POINTER(ctypes.c_float))
         self._clear_buffer_uiv = entry("glClearBufferuiv", _uint, _int, ctypes.POINTER(_uint))
         self._sampler_parameter_i = entry("glSamplerParameteri", _uint, _uint, _int)
+        self._blend_equation = entry("glBlendEquation", _uint)
         self._blend_equation_i = entry("glBlendEquationi", _uint, _uint)
         self._clip_control = (
             entry("glClipControl", _uint, _uint)
@@ -149,8 +151,12 @@ class RawGL:
         self._vertex_attrib_divisor(location, divisor)
 
     def blend_greatest(self, attachment: int) -> None:
-        """Let blending keep the greatest of what is drawn into one attachment, until `blend_equation` is set for all."""
+        """Let blending keep the greatest of what is drawn into one attachment, until `blend_sum`."""
         self._blend_equation_i(attachment, _MAX)
+
+    def blend_sum(self) -> None:
+        """Let blending add up in all attachments."""
+        self._blend_equation(_FUNC_ADD)
 
     def mirror_repeat(self, sampler: moderngl.Sampler) -> None:
         """Let a sampler mirror its texture at every integer coordinate."""

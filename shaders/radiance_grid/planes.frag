@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Faces' planes, colours and emission from what their points added up.
+// Faces' planes, colours and emission from what their points added up: those that show them their front, and those of
+// the opposite face, which show them their back.
 
 #include "radiance_grid/plane.glsl"
+#include "radiance_grid/table.glsl"
+#include "generated/FaceUniforms.glsl"
 
+uniform usampler2D face_places;
 uniform sampler2D sum_base_color;
 uniform sampler2D sum_offset;
 uniform sampler2D sum_normal;
@@ -17,15 +21,25 @@ layout(location = 3) out vec4 out_emission;
 
 void main()
 {
-    ivec2 texel = ivec2(gl_FragCoord.xy);
-    vec4 base_color = texelFetch(sum_base_color, texel, 0);
+    int face = int(gl_FragCoord.y) * FACES_PER_ROW + int(gl_FragCoord.x);
+    if (face < first_face || face >= end_face)
+        discard;
+    ivec2 own = face_texel(face);
+    // Every cell has opposite faces together, one after the other.
+    bool positive = (texelFetch(face_places, own, 0).g & 1u) == 0u;
+    ivec2 other = face_texel(positive ? face + 1 : face - 1);
+    vec4 base_color = texelFetch(sum_base_color, own, 0) + texelFetch(sum_base_color, other, 0);
+    vec4 offsets = texelFetch(sum_offset, own, 0), other_offsets = texelFetch(sum_offset, other, 0);
+    vec4 normals = texelFetch(sum_normal, own, 0), other_normals = texelFetch(sum_normal, other, 0);
+    vec4 emissions = texelFetch(sum_emission, own, 0), other_emissions = texelFetch(sum_emission, other, 0);
     float area = max(base_color.a, 1e-37);
-    vec3 normal = texelFetch(sum_normal, texel, 0).xyz;
+    vec3 normal = normals.xyz - other_normals.xyz;
     normal /= max(length(normal), 1e-37);
-    vec3 offset = texelFetch(sum_offset, texel, 0).xyz / area;
-    vec3 low = 0.5 - texelFetch(least, texel, 0).xyz, high = texelFetch(most, texel, 0).xyz - 0.5;
+    vec3 offset = (offsets.xyz + other_offsets.xyz) / area;
+    vec3 high = max(texelFetch(most, own, 0).xyz, texelFetch(most, other, 0).xyz) - 0.5;
+    vec3 low = 0.5 - max(texelFetch(least, own, 0).xyz, texelFetch(least, other, 0).xyz);
     out_plane = encode_plane(Plane(normal, dot(normal, offset), low - HALF_SPACING, high + HALF_SPACING));
     out_point = vec4(offset, base_color.a);
     out_albedo = vec4(base_color.rgb / area, 1.0);
-    out_emission = vec4(texelFetch(sum_emission, texel, 0).rgb / area, 0.0);
+    out_emission = vec4((emissions.rgb + vec3(other_offsets.a, other_normals.a, other_emissions.a)) / area, 0.0);
 }

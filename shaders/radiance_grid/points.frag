@@ -20,7 +20,7 @@ flat in float uv_scale;
 flat in vec3 color;
 #endif
 #ifdef EMISSION
-flat in float glow;
+flat in vec2 glow;
 #endif
 
 #ifdef OCCUPANCY
@@ -53,14 +53,15 @@ void main()
 #ifdef ATTRIBUTE
     base_color *= color;
 #endif
-    vec3 emission = vec3(0.0);
+    vec3 front = vec3(0.0), back = vec3(0.0);
 #ifdef EMISSION
-    emission = glow * finite_radiance(material_emission.rgb);
+    front = glow.x * finite_radiance(material_emission.rgb);
+    back = glow.y * finite_radiance(material_emission.rgb);
 #endif
     sum_base_color = vec4(clamp(base_color, 0.0, LARGEST_REFLECTANCE), 1.0) * area;
-    sum_offset = vec4(offset, 0.0) * area;
-    sum_normal = vec4(normal, 0.0) * area;
-    sum_emission = vec4(emission, 0.0) * area;
+    sum_offset = vec4(offset, back.r) * area;
+    sum_normal = vec4(normal, back.g) * area;
+    sum_emission = vec4(front, back.b) * area;
     most = vec4(0.5 + offset, 0.0);
     least = vec4(0.5 - offset, 0.0);
 #endif

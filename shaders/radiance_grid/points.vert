@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Points on surfaces, each to the texel of the cell's face that it belongs to. OCCUPANCY: to the texel that marks the
+// Points on surfaces, each to the texel of the cell's face that its front belongs to. OCCUPANCY: to the texel that marks the
 // face as there; otherwise to the one where the face's surface is added up.
 
 #include "gbuffer/pose.glsl"
@@ -30,7 +30,7 @@ flat out float uv_scale;
 flat out vec3 color;
 #endif
 #ifdef EMISSION
-flat out float glow;
+flat out vec2 glow;
 #endif
 
 /** Clip-space position of the centre of a texel of what is drawn into. */
@@ -50,7 +50,7 @@ void main()
     float scale = length(scaled);
     ivec3 cell = ivec3(floor(place)), size = ivec3(level_size.xyz);
     bool within = all(greaterThanEqual(cell, ivec3(0))) && all(lessThan(cell, size)) && scale > 0.0;
-    normal = side * scaled / max(scale, 1e-30);
+    normal = scaled / max(scale, 1e-30);
     offset = place - (vec3(cell) + 0.5);
     area = point_area * scale;
     cell = clamp(cell, ivec3(0), size - 1);
@@ -70,6 +70,6 @@ void main()
     color = in_color.rgb;
 #endif
 #ifdef EMISSION
-    glow = side > 0.0 ? in_glow.x : in_glow.y;
+    glow = in_glow;
 #endif
 }

@@ -49,6 +49,8 @@ class Faces:
 def number_faces(levels: tuple[GridLevel, ...], occupied: tuple[UInt8Array, ...]) -> Faces:
     """Number what is there: `occupied` (6 · cells,) per level, cell by cell, is not 0 where there is a face.
 
+    Opposite faces are there together.
+
     Raises ValueError where there are more than `MOST_FACES`.
     """
     width, height = (max(level.size[axis] for level in levels) for axis in (0, 1))

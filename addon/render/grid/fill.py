@@ -48,7 +48,6 @@ GRID_POINTS_UNIFORMS = UniformBlock(
         ("point_area", "float"),  # m² of object space that a point stands for
         ("point_spacing", "float"),  # m of object space between points
         ("alpha_threshold", "float"),
-        ("side", "float"),  # 1: the front of the surface, −1: its back
     ),
 )
 
@@ -120,7 +119,8 @@ class GridFill:
             for draw in draws:
                 self._draw(frame, draw, level, "OCCUPANCY", size)
             self._device.context.finish()
-            return np.frombuffer(framebuffer.read(components=1, alignment=1), np.uint8)[:count]
+            marks = np.frombuffer(framebuffer.read(components=1, alignment=1), np.uint8)[:count].reshape(-1, 2)
+            return np.repeat(marks.max(axis=1), 2)  # what has a front has a back
         finally:
             self._device.no_framebuffer.use()
             framebuffer.release()
@@ -144,7 +144,7 @@ class GridFill:
                 glow = unsampled_emission(frame.scene, draw, sampled)
                 self._draw(frame, draw, level, "", framebuffer.size, bottom, glow, textures.cells)
             bottom += level.size[2]
-        context.blend_equation = moderngl.FUNC_ADD  # of every attachment
+        self._device.raw.blend_sum()
         context.enable_only(moderngl.NOTHING)
 
     def _draw(
@@ -158,7 +158,7 @@ class GridFill:
         glow: Float32Array | None = None,
         cells: moderngl.Texture3D | None = None,
     ) -> None:
-        """Draw both sides of the points of a draw."""
+        """Draw the points of a draw."""
         points = self._points_of(frame.scene, draw, level)
         if points is None:
             return
@@ -178,20 +178,18 @@ class GridFill:
             content.append((glow_buffer, "2f/i", "in_glow"))
         vertex_array = self._device.context.vertex_array(program, content)
         high, low = split_float64(level.origin)
-        for side in (1.0, -1.0):
-            self._uniforms.bind(
-                _POINTS_BINDING,
-                level_high=(*high, 0.0),
-                level_low=(*low, 0.0),
-                level_size=(*level.size, bottom),
-                target_size=size,
-                level_cell=level.cell,
-                point_area=points.points.area,
-                point_spacing=sqrt(points.points.area),
-                alpha_threshold=frame.settings.alpha_threshold,
-                side=side,
-            )
-            vertex_array.render(moderngl.POINTS, vertices=points.points.count, instances=draw.batch.count)
+        self._uniforms.bind(
+            _POINTS_BINDING,
+            level_high=(*high, 0.0),
+            level_low=(*low, 0.0),
+            level_size=(*level.size, bottom),
+            target_size=size,
+            level_cell=level.cell,
+            point_area=points.points.area,
+            point_spacing=sqrt(points.points.area),
+            alpha_threshold=frame.settings.alpha_threshold,
+        )
+        vertex_array.render(moderngl.POINTS, vertices=points.points.count, instances=draw.batch.count)
         self._device.context.clear_samplers()
         vertex_array.release()
         if glow_buffer is not None:
@@ -231,7 +229,8 @@ class GridFill:
 
     def _find_planes(self, textures: GridTextures) -> None:
         sums = (*ADDED_UP, *GREATEST)
-        spec = self._planes.spec("radiance_grid/planes.frag", _PLANE_DEFINES, sums)
+        spec = self._planes.spec("radiance_grid/planes.frag", _PLANE_DEFINES, (*sums, "face_places"))
+        textures.places.use(len(sums))
         for unit, name in enumerate(sums):
             textures.texture(name).use(unit)
         framebuffer = textures.framebuffer("planes", "points", "albedo", "emission")

@@ -18,11 +18,10 @@ _SPREAD = 1.25
 """Sides of other levels over that of what is seen, which is within the finest."""
 
 _FARTHEST = 1e9
-"""Cells from the world's origin: beyond, a float64 no longer tells positions inside a cell apart as well as a float32."""
+"""Cells from the world's origin: beyond, float64 tells positions inside a cell apart no better than float32."""
 
-_SHIFT = (0.3819660112501051, 0.2763932022500210, 0.1458980337503155)
-"""Of the lattice against the world's origin, cells: things are modelled at round numbers, where a surface on the border
-of two cells would be in either of them by rounding."""
+_STEP = (0.8191725133961645, 0.6710436067037893, 0.5497004779019703)
+"""Of Roberts' R3 sequence (2018, "The Unreasonable Effectiveness of Quasirandom Sequences")."""
 
 _SNAP = 8
 """A level that does not cover the scene moves by so many of its cells at a time."""
@@ -38,18 +37,19 @@ BYTES_PER_CELL = 4
 class GridLevel:
     """A box of cubic cells aligned with the world's axes.
 
-    `lowest` (3,): its lowest cell, counted in cells from about the world's origin. `size` (3,): cells along each side.
-    `cell` (m): a cell's side.
+    `lowest` (3,): its lowest cell, counted in cells from the lattice's origin, which is `shift` (3,) cells from the
+    world's. `size` (3,): cells along each side. `cell` (m): a cell's side.
     """
 
     lowest: tuple[int, int, int]
     size: tuple[int, int, int]
     cell: float
+    shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
     def origin(self) -> Float64Array:
         """(3,) its lowest corner, world space."""
-        return (np.array(self.lowest, np.float64) + _SHIFT) * self.cell
+        return (np.array(self.lowest, np.float64) + self.shift) * self.cell
 
     @property
     def bounds(self) -> Float64Array:
@@ -73,36 +73,50 @@ def cell_size(seen: Float64Array, cells: int) -> float:
     return 2.0 ** (ceil(_STEPS_PER_OCTAVE * log2(side / cells)) / _STEPS_PER_OCTAVE)
 
 
+def lattice_shift(index: int) -> tuple[float, float, float]:
+    """Shift (cells, 0…1) of one of many lattices against the world's origin, evenly spread whatever their number.
+
+    None is 0: things are modelled at round numbers, and a surface on the border of two cells would be in either of them
+    by rounding.
+    """
+    x, y, z = (float(np.modf((index + 1) * step)[0]) for step in _STEP)
+    return x, y, z
+
+
 def grid_levels(
-    bounds: Float64Array, center: Float64Array, cell: float, cells: int, memory: int
+    bounds: Float64Array, center: Float64Array, cell: float, cells: int, memory: int, lattice: int = 0
 ) -> tuple[GridLevel, ...]:
     """Levels from the finest to one that covers the scene's `bounds` (2, 3), as far as `MOST_LEVELS` go; at least two.
 
     `center` (3,) of what is seen, along which there are about `cells` of the finest, `cell` m large: levels that cannot
     cover the scene are about it. `memory`: bytes that the tables of all levels' cells may take; where that is too
-    little, cells are larger.
+    little, cells are larger. `lattice`: number of one of many that are equally good.
     """
     span = min(max(int(_SPREAD * cells), 2 * _SNAP), _MOST_CELLS)
     while True:
-        levels = _levels(bounds, center, cell, span)
+        levels = _levels(bounds, center, cell, span, lattice_shift(lattice))
         if BYTES_PER_CELL * sum(level.count for level in levels) <= memory or levels[0].count <= 8:
             return levels
         cell *= 2.0 ** (1.0 / _STEPS_PER_OCTAVE)
 
 
-def _levels(bounds: Float64Array, center: Float64Array, cell: float, span: int) -> tuple[GridLevel, ...]:
+def _levels(
+    bounds: Float64Array, center: Float64Array, cell: float, span: int, shift: tuple[float, float, float]
+) -> tuple[GridLevel, ...]:
     levels: list[GridLevel] = []
     for index in range(MOST_LEVELS):
-        level, covers = _level(bounds, center, cell * 2.0**index, span)
+        level, covers = _level(bounds, center, cell * 2.0**index, span, shift)
         levels.append(level)
         if covers and index > 0:
             break
     return tuple(levels)
 
 
-def _level(bounds: Float64Array, center: Float64Array, cell: float, span: int) -> tuple[GridLevel, bool]:
+def _level(
+    bounds: Float64Array, center: Float64Array, cell: float, span: int, shift: tuple[float, float, float]
+) -> tuple[GridLevel, bool]:
     """A level, and whether it covers the scene: with a cell to spare on each side, for surfaces on a cell's side."""
-    ends = np.clip(np.concatenate([bounds, [center]]) / cell - _SHIFT, -_FARTHEST, _FARTHEST)
+    ends = np.clip(np.concatenate([bounds, [center]]) / cell - shift, -_FARTHEST, _FARTHEST)
     low, high, middle = np.floor(np.nan_to_num(ends)).astype(np.int64)
     low, high, near = low - 1, high + 2, _SNAP * (middle // _SNAP) + _SNAP // 2
     covered = bool((high - low <= _MOST_CELLS).all())
@@ -110,4 +124,4 @@ def _level(bounds: Float64Array, center: Float64Array, cell: float, span: int) -
         low, high = np.maximum(low, near - span // 2), np.minimum(high, near + span // 2)
     size = np.maximum(high - low, 1)
     lowest = (int(low[0]), int(low[1]), int(low[2]))
-    return GridLevel(lowest, (int(size[0]), int(size[1]), int(size[2])), cell), covered
+    return GridLevel(lowest, (int(size[0]), int(size[1]), int(size[2])), cell, shift), covered

@@ -39,8 +39,8 @@ that lies up to half a cell before and behind its plane, a quarter on average.""
 _DEFINES = frozenset({f"START_OFFSET {START_OFFSET}"})
 _FACE_NEEDS = (*LIGHT_DEFINES[:-1], "SPOT_CONES", "SHADOWS")
 _LIGHT_POINTS = 4
-"""Points that each light is sampled at. Closed forms with soft shadows, as previews have them, would be smoother, but let
-too much light of large lamps past what stands near these."""
+"""Points that each light is sampled at. Closed forms with soft shadows, as previews have them, would be smoother, but
+let too much light of large lamps past what stands near these."""
 
 _TEXELS_PER_CELL = 4
 _CHECKED_BOUNCES = 8
