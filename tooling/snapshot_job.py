@@ -9,7 +9,7 @@ import signal
 import sys
 import time
 from concurrent.futures import Future, wait
-from dataclasses import fields, replace
+from dataclasses import fields, is_dataclass, replace
 from enum import Enum
 from pathlib import Path
 from statistics import median
@@ -21,10 +21,11 @@ from addon.output import write_channels
 from addon.render import Device, DeviceError, Renderer, RenderError, ShaderError, gl_thread, stop_gl_thread
 from addon.report.engines import FALSE, TRUE
 from addon.report.messages import INTERRUPTED, JobError, send
-from addon.scene import Channel, Moment, RenderSettings, Scene, Sequence, snapshot
+from addon.scene import Channel, IndirectSettings, Moment, RenderSettings, Scene, Sequence, snapshot
 from addon.scene.snapshot import Snapshot
 
 T = TypeVar("T")
+S = TypeVar("S", RenderSettings, IndirectSettings)
 
 DEFAULT_RESOLUTION = (1920, 1080)
 FIXED = {"width", "height", "channels", "deep_output"}
@@ -34,15 +35,24 @@ def settings_of(job: dict[str, Any]) -> RenderSettings:
     """The render settings of a job. Raises JobError naming what cannot be set."""
     width, height = job["resolution"] or DEFAULT_RESOLUTION
     settings = RenderSettings(width, height, samples=job["samples"] or RenderSettings(1, 1).samples)
-    known = {field.name: type(getattr(settings, field.name)) for field in fields(settings) if field.name not in FIXED}
     for name, text in job["set"]:
-        if name not in known:
-            raise JobError(f"A snapshot has no setting {name!r}; it has {', '.join(sorted(known))}.")
-        try:
-            settings = replace(settings, **{name: parse(known[name], text)})
-        except ValueError as error:
-            raise JobError(f"{name}: {error}") from error
+        settings = replaced(settings, name, name.split("."), text)
     return settings
+
+
+def replaced(settings: S, name: str, path: list[str], text: str) -> S:
+    """`settings`, a dataclass, with what `path`, spelled `name`, leads to as `text` says. Raises JobError."""
+    known = {each.name: getattr(settings, each.name) for each in fields(settings) if each.name not in FIXED}
+    first, rest = path[0], path[1:]
+    if first not in known or is_dataclass(known[first]) != bool(rest):
+        names = [f"{each}.…" if is_dataclass(value) else each for each, value in known.items()]
+        raise JobError(f"A snapshot has no setting {name!r}; it has {', '.join(sorted(names))}.")
+    if rest:
+        return replace(settings, **{first: replaced(known[first], name, rest, text)})
+    try:
+        return replace(settings, **{first: parse(type(known[first]), text)})
+    except ValueError as error:
+        raise JobError(f"{name}: {error}") from error
 
 
 def parse(kind: type, text: str) -> object:

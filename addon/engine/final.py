@@ -11,7 +11,7 @@ import bpy
 from ..render import Device, LayerImages, Plan, Renderer, frames_before
 from ..scene import Channel, Moment, Sequence
 from ..scene.arrays import Float32Array
-from . import frames, gl_jobs, messages, passes, regions, settings
+from . import frames, gl_jobs, limits, messages, passes, regions, settings
 from .sessions import FinalSession
 from .statistics import Measured
 
@@ -101,22 +101,26 @@ class FinalRender:
         result: bpy.types.RenderResult,
         wanted: tuple[passes.OutputPass, ...],
     ) -> None:
-        """Render samples until there are enough or time is up, showing some on the way."""
+        """Render samples until a limit is reached, showing some on the way."""
 
         def sample(device: Device) -> int:
             done = renderer.render_sample()
             device.context.finish()
             return done
 
+        def picture() -> Float32Array:
+            return gl_jobs.finish(lambda _device: renderer.read(Channel.COMBINED))
+
         refresh_at, interval = 0.0, FIRST_REFRESH_SECONDS
-        done, total = 0, how.render.samples
-        while done < total and not (done and how.time_limit and self._elapsed() >= how.time_limit):
+        total, until = how.render.samples, limits.Limits(how)
+        while not self.measured.ended_by:
             start = time.perf_counter()
             done = gl_jobs.run(sample, self._engine.test_break)
             self.measured.sample_times.append(time.perf_counter() - start)
+            self.measured.ended_by = until.reached(done, self._elapsed(), picture)
             self._engine.update_progress(done / total)
-            self._engine.update_stats("", f"Sample {done}/{total}")
-            if done < total and self._elapsed() >= refresh_at:
+            self._engine.update_stats("", messages.progress(done, total, until.noise, self.measured.ended_by))
+            if not self.measured.ended_by and self._elapsed() >= refresh_at:
                 self._write(renderer, result, wanted[:1])
                 self._engine.update_result(result)
                 refresh_at, interval = self._elapsed() + interval, 2.0 * interval

@@ -23,6 +23,16 @@ def status(progress: str, warnings: tuple[str, ...]) -> str:
     return f"{progress} | {warnings[0]}{more}" if warnings else progress
 
 
+def progress(done: int, total: int, noise: float | None, ended_by: str) -> str:
+    """A final render's one line of status: samples, the `noise` where it is known, and the limit that ended it."""
+    parts = [f"Sample {done}/{total}"]
+    if noise is not None:
+        parts.append(f"Noise {noise:.4f}")
+    if ended_by:
+        parts.append(f"Finished by {ended_by}")
+    return " | ".join(parts)
+
+
 def internal(error: BaseException) -> str:
     """A fault of the engine itself; the traceback is in the log."""
     return f"Deep G-Buffer failed unexpectedly ({type(error).__name__}: {error}). The system console has the details."

@@ -49,6 +49,14 @@ PASSES = (
         "COLOR",
         Channel.DIFFUSE_COLOR,
     ),
+    OutputPass(
+        Channel.DIFFUSE_INDIRECT,
+        "use_pass_diffuse_indirect",
+        ("DiffInd", "Diffuse Indirect"),
+        "RGB",
+        "COLOR",
+        Channel.DIFFUSE_COLOR,
+    ),
     OutputPass(Channel.GLOSSY_COLOR, "use_pass_glossy_color", ("GlossCol", "Glossy Color"), "RGB", "COLOR"),
     OutputPass(
         Channel.GLOSSY_DIRECT,

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Blender's and our scene properties as frozen values."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import StrEnum
 from math import ceil
 from typing import Any
 
-from ..scene import Channel, DebugView, RenderSettings, ShadingModel, Variant
+from ..scene import Channel, DebugView, IndirectMethod, IndirectSettings, RenderSettings, ShadingModel, Variant
+from ..scene.quality import QualityNumbers
 
 
 class SeparationUnit(StrEnum):
@@ -25,10 +26,11 @@ class GuardBandUnit(StrEnum):
 
 @dataclass(frozen=True)
 class FinalSettings:
-    """Settings of a final render; `time_limit` in seconds, 0 for none."""
+    """Settings of a final render; `time_limit` in seconds, `noise_threshold` as of `noise_left`, 0 for none."""
 
     render: RenderSettings
-    time_limit: float
+    time_limit: float = 0.0
+    noise_threshold: float = 0.0
 
 
 def final(
@@ -50,15 +52,39 @@ def final(
         deep_output=deep_output,
         motion_vectors=writes_layers and ours.save_motion,
         exit_surfaces=deep_output and ours.save_exit,
+        indirect=indirect(ours.indirect, ours.indirect.render),
         **_common(scene, width, height),
     )
-    return FinalSettings(render, ours.time_limit)
+    return FinalSettings(render, ours.time_limit, ours.noise_threshold if ours.use_noise_threshold else 0.0)
 
 
 def viewport(scene: Any, width: int, height: int) -> RenderSettings:
     """Settings of a viewport of `width` x `height` pixels."""
-    samples = scene.deep_gbuffer.viewport_samples
-    return RenderSettings(width=width, height=height, samples=samples, **_common(scene, width, height))
+    ours = scene.deep_gbuffer
+    return RenderSettings(
+        width=width,
+        height=height,
+        samples=ours.viewport_samples,
+        indirect=indirect(ours.indirect, ours.indirect.viewport),
+        **_common(scene, width, height),
+    )
+
+
+def indirect(group: Any, quality: Any) -> IndirectSettings:
+    """What `Scene.deep_gbuffer.indirect` says, with the numbers of its render's or its viewport's `quality`."""
+    return IndirectSettings(
+        method=IndirectMethod(group.method),
+        bounces=None if group.unlimited_bounces else group.bounces,
+        radius=group.radius,
+        march_distance=group.march_distance,
+        exit_surfaces=group.exit_surfaces,
+        cell_size=group.cell_size,
+        grid_memory=int(group.grid_memory),
+        spatial_filter=group.spatial_filter,
+        temporal_filter=group.temporal_filter,
+        paper_composite=group.paper_composite,
+        **{field.name: int(getattr(quality, field.name)) for field in fields(QualityNumbers)},
+    )
 
 
 def _common(scene: Any, width: int, height: int) -> dict[str, Any]:

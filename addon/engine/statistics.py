@@ -16,12 +16,16 @@ _last: dict[str, dict[str, Any]] = {}
 
 @dataclass
 class Measured:
-    """One view layer's render. Times in seconds from the start of that layer's render."""
+    """One view layer's render. Times in seconds from the start of that layer's render.
+
+    `ended_by`: the limit that ended it, "" where it was cancelled.
+    """
 
     sync_s: float = 0.0
     first_picture_s: float = 0.0
     total_s: float = 0.0
     sample_times: list[float] = field(default_factory=list[float])
+    ended_by: str = ""
     warnings: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
     renderer: RenderStatistics | None = None
@@ -58,7 +62,8 @@ def as_object(layers: list[Measured]) -> dict[str, Any]:
 
     Seconds: `sync_s`, `upload_s`, `total_s` (sums over view layers), `first_picture_s` (until the first sample of
     the first layer is in Blender's result), `sample_s` (median warm sample of all layers).
-    `samples` per layer; `passes` [{name, ms}]; `left_out` [{name, reason}]; `triangles`, `draws`, `instances` and
+    `samples` per layer, and the limit they were `ended_by` in the last one, "" where it was cancelled.
+    `passes` [{name, ms}]; `left_out` [{name, reason}]; `triangles`, `draws`, `instances` and
     `bytes` {target: n} of the layer that has most of them; `warnings` [text]; `files` [path] of the layer
     output; `engine`, `device`, `blender`.
     """
@@ -76,6 +81,7 @@ def as_object(layers: list[Measured]) -> dict[str, Any]:
         "sample_s": mathematics.median([layer.sample_s for layer in layers]) if layers else 0.0,
         "total_s": sum(layer.total_s for layer in layers),
         "samples": max((len(layer.sample_times) for layer in layers), default=0),
+        "ended_by": layers[-1].ended_by if layers else "",
         "passes": [{"name": name, "ms": milliseconds} for name, milliseconds in passes.items()],
         "left_out": [{"name": name, "reason": reason} for name, reason in left_out.items() if name not in passes],
         "triangles": max((renderer.triangles for renderer in rendered), default=0),

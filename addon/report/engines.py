@@ -6,6 +6,7 @@ Used inside Blender but imports nothing of it; what it reads is duck-typed.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
@@ -48,20 +49,38 @@ def settable(group: Any) -> dict[str, Any]:
 
 
 def assign(group: Any, name: str, text: str) -> None:
-    """Set property `name` of `group` from `text`.
+    """Set property `name` of `group` from `text`; dots lead to groups within it, as in `indirect.method`.
 
     Raises ValueError, naming the known properties or values, where there is no such property or the text is no value
     of it.
     """
+    inner, dot, rest = name.partition(".")
+    if dot:
+        assign(_group_in(group, inner), rest, text)
+        return
     known = settable(group)
     if name not in known:
-        near = get_close_matches(name, known, n=5)
-        hint = f"did you mean {' or '.join(near)}?" if near else f"it has {', '.join(sorted(known))}."
-        raise ValueError(f"{group.bl_rna.identifier} has no property {name!r}; {hint}")
+        raise ValueError(f"{group.bl_rna.identifier} has no property {name!r}; {_hint(name, known)}")
     try:
         setattr(group, name, parse(known[name], text))
     except TypeError as error:  # an enumeration whose values depend on the scene
         raise ValueError(f"{name}: {error}") from error
+
+
+def _group_in(group: Any, name: str) -> Any:
+    """The group of settings `name` within `group`. Raises ValueError naming those there are."""
+    known = {prop.identifier for prop in group.bl_rna.properties if prop.type == "POINTER"} - {"rna_type"}
+    if name not in known:
+        raise ValueError(f"{group.bl_rna.identifier} has no settings {name!r}; {_hint(name, known)}")
+    return getattr(group, name)
+
+
+def _hint(name: str, known: Collection[str]) -> str:
+    """What may have been meant by an unknown name."""
+    near = get_close_matches(name, known, n=5)
+    if near:
+        return f"did you mean {' or '.join(near)}?"
+    return f"it has {', '.join(sorted(known)) or 'none'}."
 
 
 def parse(prop: Any, text: str) -> object:

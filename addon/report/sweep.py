@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from ..scene import IndirectMethod
+from ..scene.quality import DEFAULT_QUALITY, QUALITIES
 from .reference import REFERENCE_SETTINGS, UNBIASED
 
 PRESETS = Path(__file__).resolve().parent.parent / "ui" / "presets" / "deep_gbuffer"
@@ -64,6 +66,11 @@ def each(name: str, values: Iterable[object], label: str = "{}") -> dict[str, Se
     return {label.format(value): {name: str(value)} for value in values}
 
 
+def named(name: str, values: Mapping[str, object]) -> dict[str, Settings]:
+    """One point per value of the property `name`, by the labels of `values`."""
+    return {label: {name: str(value)} for label, value in values.items()}
+
+
 def presets(folder: str) -> dict[str, Settings]:
     """One point per preset file in our presets' `folder`, with every engine setting that it makes."""
     return {path.stem: _assignments(path) for path in sorted((PRESETS / folder).glob("*.py"))}
@@ -84,11 +91,15 @@ OURS = "DEEP_GBUFFER"
 NO_FILES = {"save_layers": "False", "save_deep": "False", "save_snapshot": "False"}
 """What is measured is the picture, and files of the scene's own must not be written again."""
 
-PICTURE = {**NO_FILES, "debug_view": "NONE", "time_limit": "0"}
+PICTURE = {**NO_FILES, "debug_view": "NONE", "time_limit": "0", "use_noise_threshold": "False"}
 """Nothing of the file's own shows something else, writes files or stops early."""
 
 STRUCTURE = {**PICTURE, "samples": "4"}
 """What the axes other than the number of samples are measured with."""
+
+METHOD = "indirect.method"
+EXIT = "indirect.exit_surfaces"
+LAYERED = each("layers", (1, 2, 4))
 
 DENOISED = {
     **UNBIASED,
@@ -107,9 +118,53 @@ SWEEP = (
         PICTURE,
         quick=("1 spp", "4 spp", "16 spp", "64 spp"),
     ),
-    Series("Quality preset", OURS, presets("sampling"), PICTURE, quick=("Draft",)),
+    Series("Sampling preset", OURS, presets("sampling"), PICTURE),
+    Series(
+        "Method",
+        OURS,
+        named(
+            METHOD,
+            {
+                "direct light only": IndirectMethod.NONE,
+                "ambient occlusion": IndirectMethod.OCCLUSION,
+                "SSAO": IndirectMethod.SSAO,
+                "radiosity": IndirectMethod.RADIOSITY,
+                "deep march": IndirectMethod.DEEP_MARCH,
+            },
+        ),
+        STRUCTURE,
+        quick=("direct light only", "deep march"),
+    ),
+    Series(
+        "Indirect quality",
+        OURS,
+        {
+            quality.value.capitalize(): {"indirect.render.preset": quality.value}
+            for quality in QUALITIES
+            if quality is not DEFAULT_QUALITY
+        },
+        STRUCTURE,
+        quick=("Draft",),
+    ),
+    Series("Contact steps", OURS, each("indirect.render.contact_steps", (0, 8)), STRUCTURE),
+    Series(
+        "Bounces",
+        OURS,
+        {**each("indirect.bounces", (1, 2)), **named("indirect.unlimited_bounces", {"∞": True})},
+        STRUCTURE,
+    ),
+    Series("Layers, no exit surfaces", OURS, LAYERED, {**STRUCTURE, EXIT: "False"}),
+    Series("Deep march, layers", OURS, LAYERED, {**STRUCTURE, METHOD: IndirectMethod.DEEP_MARCH}),
+    Series(
+        "Deep march, layers, no exit surfaces",
+        OURS,
+        LAYERED,
+        {**STRUCTURE, METHOD: IndirectMethod.DEEP_MARCH, EXIT: "False"},
+    ),
+    Series("Radiosity, layers", OURS, LAYERED, {**STRUCTURE, METHOD: IndirectMethod.RADIOSITY}),
+    Series("Ambient occlusion, layers", OURS, LAYERED, {**STRUCTURE, METHOD: IndirectMethod.OCCLUSION}),
     Series("Resolution scale", OURS, each(PERCENT, (50, 75), "{} %"), STRUCTURE, quick=("50 %",)),
-    Series("Layers", OURS, each("layers", (1, 2, 4, 8)), STRUCTURE, quick=("1", "4")),
+    Series("Layers", OURS, {**LAYERED, **each("layers", (8,))}, STRUCTURE, quick=("1",)),
     Series("Minimum separation", OURS, each("minimum_separation", (0, 0.05, 1), "{} m"), STRUCTURE),
     Series("Layer preset", OURS, presets("layers"), STRUCTURE),
     Series(
@@ -117,7 +172,6 @@ SWEEP = (
         OURS,
         each("variant", ("PREPASS", "DELAY", "PREVIOUS", "PREDICT", "REPROJECT")),
         STRUCTURE,
-        quick=("PREPASS",),
     ),
     Series(
         "Cycles",

@@ -12,15 +12,19 @@ from . import (
     compared_images,
     comparing,
     data_panels,
+    indirect_panels,
     operators,
     panels,
     properties,
+    sampling_panels,
     standard_panels,
 )
 
 _CLASSES = (
     *operators.CLASSES,
     *compare.CLASSES,
+    *sampling_panels.CLASSES,
+    *indirect_panels.CLASSES,
     *panels.CLASSES,
     *compare_panels.CLASSES,
     *data_panels.CLASSES,

@@ -2,15 +2,18 @@
 """Operators: statistics to the clipboard, presets."""
 
 import json
+from dataclasses import fields
 from typing import Any, ClassVar
 
 import bpy
 from bl_operators.presets import AddPresetBase
 
 from ..engine import statistics
+from ..scene.quality import QualityNumbers
 
 SAMPLING_PRESETS = "deep_gbuffer/sampling"
 LAYERS_PRESETS = "deep_gbuffer/layers"
+INDIRECT_PRESETS = "deep_gbuffer/indirect"
 
 
 class DEEP_GBUFFER_OT_copy_statistics(bpy.types.Operator):
@@ -46,7 +49,36 @@ class DEEP_GBUFFER_OT_sampling_preset_add(_PresetAdd, bpy.types.Operator):  # py
     preset_values: ClassVar[list[str]] = [
         "settings.samples",
         "settings.viewport_samples",
+        "settings.use_noise_threshold",
+        "settings.noise_threshold",
         "settings.time_limit",
+    ]
+
+
+class DEEP_GBUFFER_OT_indirect_preset_add(_PresetAdd, bpy.types.Operator):  # pyright: ignore[reportIncompatibleMethodOverride]
+    """Add or remove an indirect light preset"""
+
+    bl_idname = "deep_gbuffer.indirect_preset_add"
+    bl_label = "Add Indirect Light Preset"
+    preset_menu = "DEEP_GBUFFER_PT_indirect_presets"
+    preset_subdir = INDIRECT_PRESETS
+    preset_values: ClassVar[list[str]] = [
+        "settings.indirect.method",
+        "settings.indirect.bounces",
+        "settings.indirect.unlimited_bounces",
+        "settings.indirect.radius",
+        "settings.indirect.march_distance",
+        "settings.indirect.exit_surfaces",
+        "settings.indirect.cell_size",
+        "settings.indirect.grid_memory",
+        "settings.indirect.spatial_filter",
+        "settings.indirect.temporal_filter",
+        "settings.indirect.paper_composite",
+        *(
+            f"settings.indirect.{use}.{number.name}"
+            for use in ("render", "viewport")
+            for number in fields(QualityNumbers)
+        ),
     ]
 
 
@@ -73,5 +105,6 @@ class DEEP_GBUFFER_OT_layers_preset_add(_PresetAdd, bpy.types.Operator):  # pyri
 CLASSES = (
     DEEP_GBUFFER_OT_copy_statistics,
     DEEP_GBUFFER_OT_sampling_preset_add,
+    DEEP_GBUFFER_OT_indirect_preset_add,
     DEEP_GBUFFER_OT_layers_preset_add,
 )

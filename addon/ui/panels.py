@@ -7,15 +7,14 @@ import bpy
 from bl_ui.utils import PresetPanel
 
 from ..engine import passes, statistics
-from ..engine.settings import GuardBandUnit, SeparationUnit
+from ..engine.settings import GuardBandUnit, SeparationUnit, indirect
 from ..render import reads_past_the_edge
-from ..scene import DebugView, Variant
+from ..render.indirect_plan import INDIRECT_DEBUG_VIEWS, reads_layers
+from ..scene import DebugView, IndirectMethod, Variant
 from .operators import (
     LAYERS_PRESETS,
-    SAMPLING_PRESETS,
     DEEP_GBUFFER_OT_copy_statistics,
     DEEP_GBUFFER_OT_layers_preset_add,
-    DEEP_GBUFFER_OT_sampling_preset_add,
 )
 
 CLOSED: Any = {"DEFAULT_CLOSED"}
@@ -40,66 +39,6 @@ class EnginePanel:
         self.layout.use_property_split = True
         self.layout.use_property_decorate = False
         return self.layout.column()
-
-
-class DEEP_GBUFFER_PT_sampling_presets(PresetPanel, bpy.types.Panel):
-    """Presets of the Sampling panel."""
-
-    bl_label = "Sampling Presets"
-    preset_subdir = SAMPLING_PRESETS
-    preset_operator = "script.execute_preset"
-    preset_add_operator = DEEP_GBUFFER_OT_sampling_preset_add.bl_idname
-
-
-class DEEP_GBUFFER_PT_sampling(EnginePanel, bpy.types.Panel):
-    """Samples of the final render and of viewports."""
-
-    bl_label = "Sampling"
-
-    def draw_header_preset(self, context: Any) -> None:
-        """The presets menu."""
-        DEEP_GBUFFER_PT_sampling_presets.draw_panel_header(self.layout)
-
-    def draw(self, context: Any) -> None:
-        """Samples, time, seed."""
-        settings = context.scene.deep_gbuffer
-        column = self._column()
-        samples = column.column(align=True)
-        samples.prop(settings, "samples", text="Render")
-        samples.prop(settings, "viewport_samples", text="Viewport")
-        column.prop(settings, "time_limit")
-        column.prop(settings, "seed")
-
-
-class DEEP_GBUFFER_PT_sampling_lights(EnginePanel, bpy.types.Panel):
-    """How lights and world are sampled."""
-
-    bl_label = "Lights"
-    bl_parent_id = "DEEP_GBUFFER_PT_sampling"
-    bl_options = CLOSED
-
-    def draw(self, context: Any) -> None:
-        """What bounds the cost of many lights, and of the world."""
-        settings = context.scene.deep_gbuffer
-        column = self._column()
-        column.prop(settings, "light_threshold")
-        column.prop(settings, "world_directions")
-
-
-class DEEP_GBUFFER_PT_sampling_shadows(EnginePanel, bpy.types.Panel):
-    """Shadow maps."""
-
-    bl_label = "Shadows"
-    bl_parent_id = "DEEP_GBUFFER_PT_sampling"
-    bl_options = CLOSED
-
-    def draw(self, context: Any) -> None:
-        """Their size and memory, and how often they are drawn."""
-        settings = context.scene.deep_gbuffer
-        column = self._column()
-        column.prop(settings, "shadow_map_size", text="Map Size")
-        column.prop(settings, "shadow_memory", text="Pool Size")
-        column.prop(settings, "shadow_updates")
 
 
 class DEEP_GBUFFER_PT_shading(EnginePanel, bpy.types.Panel):
@@ -143,7 +82,7 @@ class DEEP_GBUFFER_PT_layers(EnginePanel, bpy.types.Panel):
         relative = settings.separation_unit == SeparationUnit.RELATIVE
         several.prop(settings, "relative_separation" if relative else "minimum_separation", text="Minimum")
         if settings.layers > 1 and not _reads_deeper_layers(settings):
-            column.label(text="Only layer output and debug views read them yet", icon="INFO")
+            column.label(text="Nothing reads more than one with these settings", icon="INFO")
 
 
 class DEEP_GBUFFER_PT_guard_band(EnginePanel, bpy.types.Panel):
@@ -172,12 +111,19 @@ class DEEP_GBUFFER_PT_guard_band(EnginePanel, bpy.types.Panel):
 def _reads_deeper_layers(settings: Any) -> bool:
     """Whether anything that is switched on reads a layer behind the first."""
     shown = settings.debug_view != DebugView.NONE and settings.debug_layer > 1
-    return settings.save_layers or settings.save_deep or shown
+    return settings.save_layers or settings.save_deep or shown or _marches(settings)
 
 
 def _reads_past_the_edge(settings: Any) -> bool:
     """Whether anything that is switched on reads the guard band."""
-    return settings.layers > 1 and reads_past_the_edge(Variant(settings.variant))
+    reprojects = settings.layers > 1 and reads_past_the_edge(Variant(settings.variant))
+    return reprojects or settings.indirect.method != IndirectMethod.NONE
+
+
+def _marches(settings: Any) -> bool:
+    """Whether indirect light is looked for in the layers, by final renders or by viewports."""
+    group = settings.indirect
+    return any(reads_layers(indirect(group, quality)) for quality in (group.render, group.viewport))
 
 
 class DEEP_GBUFFER_PT_film(EnginePanel, bpy.types.Panel):
@@ -205,7 +151,7 @@ class DEEP_GBUFFER_PT_debug_view(EnginePanel, bpy.types.Panel):
         column = self._column()
         column.prop(settings, "debug_view", text="Channel")
         layer = column.column()
-        layer.active = settings.debug_view != "NONE"
+        layer.active = settings.debug_view not in {DebugView.NONE, *INDIRECT_DEBUG_VIEWS}
         layer.prop(settings, "debug_layer")
 
 
@@ -265,7 +211,8 @@ class DEEP_GBUFFER_PT_statistics(EnginePanel, bpy.types.Panel):
         table(self.layout, "Left out", [(item["name"], item["reason"]) for item in last["left_out"]])
         table(self.layout, "Memory", [(name, f"{size / 2**20:.1f} MiB") for name, size in last["bytes"].items()])
         counts = [(key.capitalize(), f"{last[key]:,}") for key in ("samples", "triangles", "draws", "instances")]
-        table(self.layout, "Scene", [*counts, ("Device", last["device"])])
+        ended = [("Ended by", last["ended_by"].capitalize())] if last["ended_by"] else []
+        table(self.layout, "Scene", [*counts, *ended, ("Device", last["device"])])
         self.layout.operator(DEEP_GBUFFER_OT_copy_statistics.bl_idname, icon="COPYDOWN")
 
 
@@ -291,10 +238,6 @@ def table(layout: Any, title: str, rows: list[tuple[str, str]]) -> None:
 
 
 CLASSES = (
-    DEEP_GBUFFER_PT_sampling_presets,
-    DEEP_GBUFFER_PT_sampling,
-    DEEP_GBUFFER_PT_sampling_lights,
-    DEEP_GBUFFER_PT_sampling_shadows,
     DEEP_GBUFFER_PT_shading,
     DEEP_GBUFFER_PT_layers_presets,
     DEEP_GBUFFER_PT_layers,

@@ -4,124 +4,24 @@
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
-from ..engine import viewport
 from ..engine.settings import GuardBandUnit, SeparationUnit
 from ..scene import DebugView, ShadingModel, Variant
 from ..scene.settings import MAXIMUM_LAYERS
+from .changes import changed
+from .choices import (
+    DEBUG_ITEMS,
+    GUARD_BAND_ITEMS,
+    MEMORY_ITEMS,
+    SEPARATION_ITEMS,
+    SHADING_ITEMS,
+    SHADOW_MAP_SIZE_ITEMS,
+    VARIANT_ITEMS,
+)
+from .indirect_properties import DeepGBufferIndirectQuality, DeepGBufferIndirectSettings
 
 _SCENE: Any = bpy.types.Scene  # takes properties that its type does not name
-# Files store an item's place in its list: new ones go to the end.
-DEBUG_ITEMS = [
-    (DebugView.NONE.value, "Rendered", "The finished picture"),
-    (DebugView.DEPTH.value, "Depth", "Distance from the camera plane"),
-    (DebugView.NORMAL.value, "Normal", "World-space shading normal"),
-    (DebugView.ALBEDO.value, "Albedo", "Base color of the surface"),
-    (DebugView.METALLIC.value, "Metallic", "How metallic the surface is"),
-    (DebugView.ROUGHNESS.value, "Roughness", "Perceptual roughness of the surface"),
-    (DebugView.EMISSION.value, "Emission", "Radiance that the surface itself emits"),
-    (DebugView.OBJECT_INDEX.value, "Object Index", "Pass index of the object"),
-    (DebugView.DIRECT.value, "Direct Light", "Light that reaches the layer straight from lights and world"),
-    (
-        DebugView.MOTION.value,
-        "Motion",
-        "Movement since the previous frame: gray at rest, redder to the right, greener upwards",
-    ),
-    (
-        DebugView.EXIT_DEPTH.value,
-        "Exit Depth",
-        "Distance from the camera plane where the view leaves the object again",
-    ),
-    (DebugView.EXIT_NORMAL.value, "Exit Normal", "World-space normal of the surface through which the view leaves"),
-    (DebugView.EXIT_ALBEDO.value, "Exit Albedo", "Base color of the surface through which the view leaves"),
-]
-VARIANT_ITEMS = [
-    (
-        Variant.TWO_PASS.value,
-        "Two-Pass",
-        "Draw the whole scene once per layer. Always exact; scenes with many polygons take longest",
-    ),
-    (
-        Variant.PREPASS.value,
-        "Prepass",
-        "Draw the scene's depth first, then all layers at once. Always exact; the depth costs an extra, plainer pass",
-    ),
-    (
-        Variant.DELAY.value,
-        "Delay",
-        "Draw the next picture's depth along with each picture, then all layers at once. Always exact; viewports "
-        "show every change one picture late, final renders do not",
-    ),
-    (
-        Variant.PREVIOUS.value,
-        "Previous",
-        "Draw all layers at once, guided by the previous frame's depth at the same pixel. Fast in viewports, and exact "
-        "at rest; around anything that moves, hidden layers miss surfaces or hold some that are too close. Final "
-        "renders evaluate the frame before for it and are no faster than with Prepass",
-    ),
-    (
-        Variant.PREDICT.value,
-        "Predict",
-        "Draw all layers at once, guided by where the last two frames suggest that everything is now. Exact for "
-        "steady motion; sudden changes put errors into hidden layers for a frame. Final renders evaluate the two "
-        "frames before for it and are no faster than with Prepass",
-    ),
-    (
-        Variant.REPROJECT.value,
-        "Reproject",
-        "Draw all layers at once, comparing each surface with the previous frame where it was then. Follows any "
-        "motion; small errors remain where surfaces come into view, and at the picture's edge without a guard band. "
-        "Final renders evaluate the frame before for it and are no faster than with Prepass",
-    ),
-]
-SEPARATION_ITEMS = [
-    (SeparationUnit.DISTANCE.value, "Distance", "The same distance everywhere"),
-    (
-        SeparationUnit.RELATIVE.value,
-        "Relative to Depth",
-        "A fraction of the distance from the camera, for scenes that reach from near to far",
-    ),
-]
-SHADING_ITEMS = [
-    (
-        ShadingModel.PHYSICAL.value,
-        "Physically Based",
-        "Surfaces reflect light as the Principled BSDF does in Cycles",
-    ),
-    (
-        ShadingModel.PHONG.value,
-        "Phong",
-        "A preview: plain diffuse reflection and a Blinn-Phong highlight, for each pixel; does not look like Cycles",
-    ),
-    (
-        ShadingModel.GOURAUD.value,
-        "Gouraud",
-        "A preview: as Phong, but for each vertex and blended in between; without shadows, and highlights show the "
-        "mesh's triangles",
-    ),
-]
-SHADOW_MAP_SIZE_ITEMS = [
-    (str(2**power), f"{2**power} px", f"At most {2**power} x {2**power} pixels for one shadow map")
-    for power in range(8, 14)
-]
-SHADOW_MEMORY_ITEMS = [
-    (
-        str(2**power),
-        f"{2**power} MB" if power < 10 else f"{2 ** (power - 10)} GB",
-        f"Keep at most {2**power} MB of them",
-    )
-    for power in range(4, 13)
-]
-GUARD_BAND_ITEMS = [
-    (GuardBandUnit.PIXELS.value, "Pixels", "The same number of pixels whatever the picture's size"),
-    (GuardBandUnit.PERCENT.value, "Percent", "A share of the picture's longer side"),
-]
-
-
-def _changed(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    """Scripts that set a property cause no redraw by themselves."""
-    viewport.redraw()
 
 
 class DeepGBufferSettings(bpy.types.PropertyGroup):
@@ -142,7 +42,7 @@ class DeepGBufferSettings(bpy.types.PropertyGroup):
         min=1,
         soft_max=256,
         max=65536,
-        update=_changed,
+        update=changed,
     )
     time_limit: FloatProperty(
         name="Time Limit",
@@ -154,13 +54,30 @@ class DeepGBufferSettings(bpy.types.PropertyGroup):
         step=100,
         unit="TIME_ABSOLUTE",
     )
+    use_noise_threshold: BoolProperty(
+        name="Use Noise Threshold",
+        description="Stop the final render of a view layer with fewer samples where its noise is low enough",
+        default=False,
+    )
+    noise_threshold: FloatProperty(
+        name="Noise Threshold",
+        description="Noise at which the final render of a view layer stops: lower values take more samples. It is "
+        "estimated as in Cycles, where the picture is noisiest, whenever the number of samples has doubled",
+        default=0.01,
+        min=1e-5,
+        soft_min=0.001,
+        soft_max=1.0,
+        max=10.0,
+        step=1,
+        precision=4,
+    )
     seed: IntProperty(
         name="Seed",
         description="Changes every sampling pattern; equal seeds give equal pictures",
         default=0,
         min=0,
         max=2**31 - 1,
-        update=_changed,
+        update=changed,
     )
     layers: IntProperty(
         name="Layers",
@@ -168,21 +85,21 @@ class DeepGBufferSettings(bpy.types.PropertyGroup):
         default=2,
         min=1,
         max=MAXIMUM_LAYERS,
-        update=_changed,
+        update=changed,
     )
     variant: EnumProperty(
         name="Variant",
         description="How the layers behind the nearest surfaces are found: what is exact, and what is faster",
         items=VARIANT_ITEMS,
         default=Variant.TWO_PASS.value,
-        update=_changed,
+        update=changed,
     )
     separation_unit: EnumProperty(
         name="Separation",
         description="What the minimum separation of layers is measured in",
         items=SEPARATION_ITEMS,
         default=SeparationUnit.DISTANCE.value,
-        update=_changed,
+        update=changed,
     )
     minimum_separation: FloatProperty(
         name="Minimum Separation",
@@ -193,7 +110,7 @@ class DeepGBufferSettings(bpy.types.PropertyGroup):
         soft_max=10.0,
         precision=3,
         subtype="DISTANCE",
-        update=_changed,
+        update=changed,
     )
     relative_separation: FloatProperty(
         name="Minimum Separation",
@@ -204,21 +121,21 @@ class DeepGBufferSettings(bpy.types.PropertyGroup):
         soft_max=1.0,
         precision=3,
         subtype="FACTOR",
-        update=_changed,
+        update=changed,
     )
     use_guard_band: BoolProperty(
         name="Guard Band",
         description="Render past the picture's edge internally, so that effects which look up neighboring pixels or "
         "the previous frame find data there; the picture itself keeps its size",
         default=False,
-        update=_changed,
+        update=changed,
     )
     guard_band_unit: EnumProperty(
         name="Unit",
         description="What the width of the guard band is measured in",
         items=GUARD_BAND_ITEMS,
         default=GuardBandUnit.PIXELS.value,
-        update=_changed,
+        update=changed,
     )
     guard_band_pixels: IntProperty(
         name="Width",
@@ -228,7 +145,7 @@ class DeepGBufferSettings(bpy.types.PropertyGroup):
         soft_max=256,
         max=4096,
         subtype="PIXEL",
-        update=_changed,
+        update=changed,
     )
     guard_band_percent: FloatProperty(
         name="Width",
@@ -238,14 +155,14 @@ class DeepGBufferSettings(bpy.types.PropertyGroup):
         soft_max=10.0,
         max=50.0,
         subtype="PERCENTAGE",
-        update=_changed,
+        update=changed,
     )
     shading_model: EnumProperty(
         name="Shading",
         description="How surfaces reflect the light that reaches them directly. Phong and Gouraud are previews",
         items=SHADING_ITEMS,
         default=ShadingModel.PHYSICAL.value,
-        update=_changed,
+        update=changed,
     )
     light_threshold: FloatProperty(
         name="Light Threshold",
@@ -255,7 +172,7 @@ class DeepGBufferSettings(bpy.types.PropertyGroup):
         min=0.0,
         soft_max=1.0,
         precision=3,
-        update=_changed,
+        update=changed,
     )
     world_directions: IntProperty(
         name="World Directions",
@@ -265,7 +182,7 @@ class DeepGBufferSettings(bpy.types.PropertyGroup):
         min=1,
         soft_max=16,
         max=64,
-        update=_changed,
+        update=changed,
     )
     shadow_map_size: EnumProperty(
         name="Shadow Map Size",
@@ -273,15 +190,15 @@ class DeepGBufferSettings(bpy.types.PropertyGroup):
         "map is only as large as what the view shows of its shadows",
         items=SHADOW_MAP_SIZE_ITEMS,
         default="2048",
-        update=_changed,
+        update=changed,
     )
     shadow_memory: EnumProperty(
         name="Shadow Pool Size",
         description="Graphics memory for shadow maps: with more, more lights keep theirs while nothing moves; with "
         "less, maps are smaller",
-        items=SHADOW_MEMORY_ITEMS,
+        items=MEMORY_ITEMS,
         default="512",
-        update=_changed,
+        update=changed,
     )
     shadow_updates: IntProperty(
         name="Lights per Sample",
@@ -292,14 +209,19 @@ class DeepGBufferSettings(bpy.types.PropertyGroup):
         min=1,
         soft_max=64,
         max=1024,
-        update=_changed,
+        update=changed,
+    )
+    indirect: PointerProperty(
+        name="Indirect Light",
+        description="Settings of light that surfaces reflect at each other",
+        type=DeepGBufferIndirectSettings,
     )
     debug_view: EnumProperty(
         name="Debug View",
         description="Show one channel of the deep G-buffer instead of the picture, in viewports and final renders",
         items=DEBUG_ITEMS,
         default=DebugView.NONE.value,
-        update=_changed,
+        update=changed,
     )
     debug_layer: IntProperty(
         name="Layer",
@@ -307,7 +229,7 @@ class DeepGBufferSettings(bpy.types.PropertyGroup):
         default=1,
         min=1,
         max=MAXIMUM_LAYERS,
-        update=_changed,
+        update=changed,
     )
     save_layers: BoolProperty(
         name="Multi-Layer EXR",
@@ -347,13 +269,18 @@ class DeepGBufferSettings(bpy.types.PropertyGroup):
     )
 
 
+_CLASSES = (DeepGBufferIndirectQuality, DeepGBufferIndirectSettings, DeepGBufferSettings)
+
+
 def register() -> None:
     """Give scenes their settings."""
-    bpy.utils.register_class(DeepGBufferSettings)
-    _SCENE.deep_gbuffer = bpy.props.PointerProperty(type=DeepGBufferSettings)
+    for cls in _CLASSES:
+        bpy.utils.register_class(cls)
+    _SCENE.deep_gbuffer = PointerProperty(type=DeepGBufferSettings)
 
 
 def unregister() -> None:
     """Take the settings away."""
     del _SCENE.deep_gbuffer
-    bpy.utils.unregister_class(DeepGBufferSettings)
+    for cls in reversed(_CLASSES):
+        bpy.utils.unregister_class(cls)

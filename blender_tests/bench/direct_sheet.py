@@ -49,7 +49,8 @@ def main(arguments: list[str]) -> int:
                 )
                 for seed in (0, 1)
             ]
-            ours = picture(blend, "DEEP_GBUFFER", Path(folder) / "ours.exr", RESOLUTION, OUR_SAMPLES, {})
+            direct = {"indirect.method": "NONE"}
+            ours = picture(blend, "DEEP_GBUFFER", Path(folder) / "ours.exr", RESOLUTION, OUR_SAMPLES, direct)
             pictures = [display(linear) for linear in (combined(ours), 0.5 * (halves[0] + halves[1]))]
             errors, mean = flip(pictures[1], pictures[0])
             noise = flip(*(display(half) for half in halves))[1]

@@ -82,11 +82,12 @@ def render_pair(
 
 
 def prepare(scene: bpy.types.Scene, passes: tuple[str, ...]) -> None:
-    """Ask for passes, through pixel centres, of the first view layer."""
+    """Ask for passes, through pixel centres, of the first view layer; our light is not reflected twice."""
     for name in passes:
         setattr(scene.view_layers[0], f"use_pass_{name}", True)
     scene.render.use_compositing = scene.render.use_sequencer = False
     scene.render.filter_size = SMALLEST_FILTER
+    scene.deep_gbuffer.indirect.method = "NONE"
 
 
 def prepare_cycles(scene: bpy.types.Scene, samples: int) -> None:

@@ -32,7 +32,10 @@ def registered_fixture() -> Iterator[None]:
 
 @pytest.fixture(name="plane_scene")
 def plane_scene_fixture(registered: None, tmp_path: Path) -> bpy.types.Scene:
-    """A camera looking straight down at a plane that fills the left half of the picture, 5 m away, lit by a sun."""
+    """A camera looking straight down at a plane that fills the left half of the picture, 5 m away, lit by a sun.
+
+    Its light is not reflected twice.
+    """
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     scene.render.engine = "DEEP_GBUFFER"
@@ -40,6 +43,7 @@ def plane_scene_fixture(registered: None, tmp_path: Path) -> bpy.types.Scene:
     scene.render.filepath = str(tmp_path / "frame_")
     scene.view_settings.view_transform = "Raw" if bpy.app.version < (5, 0, 0) else "Standard"
     scene.deep_gbuffer.samples = 2
+    scene.deep_gbuffer.indirect.method = "NONE"
     scene.world = bpy.data.worlds.new("Dark")
     scene.world.color = (0.0, 0.0, 0.0)
     if scene.world.node_tree is not None:

@@ -145,6 +145,7 @@ def test_statistics_have_the_documented_keys(plane_scene, tmp_path):
         "sample_s",
         "total_s",
         "samples",
+        "ended_by",
         "passes",
         "left_out",
         "triangles",
@@ -158,7 +159,7 @@ def test_statistics_have_the_documented_keys(plane_scene, tmp_path):
         "blender",
     }
     assert json.loads(json.dumps(last)) == last
-    assert last["samples"] == 2
+    assert (last["samples"], last["ended_by"]) == (2, "samples")
     assert last["triangles"] == 2
     assert 0 < last["sync_s"] < last["first_picture_s"] <= last["total_s"]
     names = [item["name"] for item in last["passes"]]
@@ -169,7 +170,8 @@ def test_a_time_limit_ends_after_the_first_sample_at_least(plane_scene, tmp_path
     plane_scene.deep_gbuffer.samples = 1000
     plane_scene.deep_gbuffer.time_limit = 1e-4
     passes = render(plane_scene, tmp_path)
-    assert statistics.last(plane_scene.name)["samples"] == 1
+    last = statistics.last(plane_scene.name)
+    assert (last["samples"], last["ended_by"]) == (1, "time limit")
     assert passes["ViewLayer.Combined"][INSIDE][0] > 0.1
 
 

@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Panels draw what is there: every property they name exists, and statistics are readable."""
 
+from functools import partial
 from types import SimpleNamespace
 
 import addon_utils
 import bpy
 import pytest
 
-from addon.ui import data_panels
+from addon.report.engines import assign
+from addon.scene import IndirectMethod
+from addon.ui import data_panels, indirect_panels, panels, sampling_panels
 from addon.ui.panels import (
-    CLASSES,
     DEEP_GBUFFER_PT_guard_band,
     DEEP_GBUFFER_PT_layer_output,
     DEEP_GBUFFER_PT_layers,
@@ -17,6 +19,7 @@ from addon.ui.panels import (
 )
 from blender_tests.blender.engine_fixtures import plane_scene_fixture, registered_fixture  # noqa: F401 - fixtures
 
+CLASSES = (*sampling_panels.CLASSES, *indirect_panels.CLASSES, *panels.CLASSES)
 PANELS = [panel for panel in CLASSES if hasattr(panel, "_column")]
 ALTERNATIVES = {"minimum_separation": "relative_separation", "guard_band_pixels": "guard_band_percent"}
 """Properties of which a panel shows one or the other."""
@@ -68,7 +71,9 @@ def drawn(panel, context=None):
     for draw in (getattr(panel, "draw_header", None), panel.draw):
         if draw is not None:
             stand_in = SimpleNamespace(layout=Layout(whole))
-            stand_in._column = lambda panel=panel, stand_in=stand_in: panel._column(stand_in)
+            for name in ("_column", "_draw_numbers"):
+                if hasattr(panel, name):
+                    setattr(stand_in, name, partial(getattr(panel, name), stand_in))
             draw(stand_in, context or bpy.context)
     return whole
 
@@ -89,8 +94,12 @@ def test_every_setting_has_its_place_in_a_panel(plane_scene):
     ours.separation_unit, ours.guard_band_unit = "RELATIVE", "PERCENT"
     others = {name for panel in PANELS for name in drawn(panel).properties}
     assert not others & set(ALTERNATIVES)
-    own = {item.identifier for item in ours.bl_rna.properties} - {"rna_type", "name"}
-    assert own <= shown | others
+    for method in IndirectMethod:
+        ours.indirect.method = method.value
+        others |= {name for panel in indirect_panels.CLASSES[1:] for name in drawn(panel).properties}
+    groups = ours, ours.indirect, ours.indirect.render
+    own = {item.identifier for group in groups for item in group.bl_rna.properties if item.type != "POINTER"}
+    assert own - {"name"} <= shown | others
     assert {"film_transparent", "filter_size", "use_pass_z", "use_pass_object_index"} <= shown
 
 
@@ -110,12 +119,23 @@ def test_what_only_concerns_several_layers_is_gray_with_one(plane_scene):
         ({"debug_view": "NORMAL", "debug_layer": 2}, False),
         ({"debug_view": "NORMAL", "debug_layer": 1}, True),
         ({"debug_layer": 2}, True),
+        ({"indirect.method": "RADIOSITY"}, False),
+        ({"indirect.method": "MARCH_GRID"}, False),
+        ({"indirect.method": "MARCH_GRID", "indirect.render.contact_steps": 0}, False),
+        (
+            {
+                "indirect.method": "MARCH_GRID",
+                "indirect.render.contact_steps": 0,
+                "indirect.viewport.contact_steps": 0,
+            },
+            True,
+        ),
     ],
 )
 def test_who_sets_layers_is_told_where_nothing_reads_them(plane_scene, change, told):
     for name, value in change.items():
-        setattr(plane_scene.deep_gbuffer, name, value)
-    assert any("read them" in text for text in drawn(DEEP_GBUFFER_PT_layers).texts) == told
+        assign(plane_scene.deep_gbuffer, name, str(value))
+    assert any("Nothing reads" in text for text in drawn(DEEP_GBUFFER_PT_layers).texts) == told
 
 
 @pytest.mark.parametrize(
@@ -131,6 +151,12 @@ def test_a_guard_band_that_nothing_reads_is_gray(plane_scene, variant, layers, u
     ours = plane_scene.deep_gbuffer
     ours.variant, ours.layers, ours.use_guard_band = variant, layers, used
     assert drawn(DEEP_GBUFFER_PT_guard_band).gray == gray
+
+
+def test_indirect_light_reads_the_guard_band(plane_scene):
+    ours = plane_scene.deep_gbuffer
+    ours.use_guard_band, ours.indirect.method = True, "MARCH_GRID"
+    assert not drawn(DEEP_GBUFFER_PT_guard_band).gray
 
 
 def test_options_of_files_that_are_not_written_are_gray(plane_scene):

@@ -47,6 +47,7 @@ def test_only_light_asks_for_a_colour_that_is_no_pass():
     asked = {channel: passes.channels([item]) - {channel} for channel, item in by_channel.items()}
     assert {channel: colors for channel, colors in asked.items() if colors} == {
         Channel.DIFFUSE_DIRECT: {Channel.DIFFUSE_COLOR},
+        Channel.DIFFUSE_INDIRECT: {Channel.DIFFUSE_COLOR},
         Channel.GLOSSY_DIRECT: {Channel.GLOSSY_COLOR},
     }
 

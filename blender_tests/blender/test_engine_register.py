@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import threading
+from functools import reduce
 from pathlib import Path
 
 import bpy
@@ -14,9 +15,11 @@ import addon
 from addon.engine import sessions, settings, viewport
 from addon.engine.statistics import ENGINE
 from addon.scene import DebugView, RenderSettings, ShadingModel, Variant
+from addon.ui import operators
 from blender_tests.blender.engine_fixtures import plane_scene_fixture, registered_fixture  # noqa: F401 - fixtures
 
 PRESETS = ("deep_gbuffer/sampling", "deep_gbuffer/layers")
+"""Folders of presets that come with the add-on."""
 LIGHT_SETTINGS = (
     "shading_model",
     "shadow_map_size",
@@ -120,8 +123,14 @@ def test_a_process_that_forgets_to_unregister_ends(registered):
 
 def test_every_property_tells_what_it_is(registered):
     settings = bpy.context.scene.deep_gbuffer
-    own = [item for item in settings.bl_rna.properties if item.identifier not in {"rna_type", "name"}]
-    assert len(own) == 27
+    groups = settings, settings.indirect, settings.indirect.render
+    own = [
+        item
+        for group in groups
+        for item in group.bl_rna.properties
+        if item.identifier not in {"rna_type", "name"} and item.type != "POINTER"
+    ]
+    assert len(own) == 29 + 11 + 8
     for item in own:
         assert len(item.description) > 15, item.identifier
         assert not item.description.endswith("."), item.identifier
@@ -132,16 +141,26 @@ def test_every_property_tells_what_it_is(registered):
             assert len(choice.description) > 15 or choice.identifier == "NONE", (item.identifier, choice.identifier)
             assert not choice.description.endswith("."), (item.identifier, choice.identifier)
     units = {item.identifier: item.unit for item in own if item.type == "FLOAT" and item.unit != "NONE"}
-    assert units == {"minimum_separation": "LENGTH", "time_limit": "TIME_ABSOLUTE"}
+    lengths = dict.fromkeys(("minimum_separation", "radius", "march_distance", "cell_size"), "LENGTH")
+    assert units == {**lengths, "time_limit": "TIME_ABSOLUTE"}
 
 
 def test_every_variant_and_every_debug_view_can_be_chosen(registered):
     properties = bpy.context.scene.deep_gbuffer.bl_rna.properties
     assert [item.identifier for item in properties["variant"].enum_items] == list(Variant)
-    assert [item.identifier for item in properties["debug_view"].enum_items] == list(DebugView)
+    assert {item.identifier for item in properties["debug_view"].enum_items} == set(DebugView)
     assert [item.identifier for item in properties["shading_model"].enum_items] == list(ShadingModel)
     assert [int(item.identifier) for item in properties["shadow_map_size"].enum_items] == [
         2**power for power in range(8, 14)
+    ]
+
+
+def test_items_keep_the_places_that_files_store(registered):
+    properties = bpy.context.scene.deep_gbuffer.bl_rna.properties
+    views = [item.identifier for item in properties["debug_view"].enum_items]
+    assert views[9:] == [
+        *("MOTION", "EXIT_DEPTH", "EXIT_NORMAL", "EXIT_ALBEDO"),
+        *("INDIRECT", "GRID_CELLS", "GRID_RADIANCE", "MARCH_HITS", "LIGHT_ORIGIN"),
     ]
 
 
@@ -153,6 +172,7 @@ def test_defaults(registered, plane_scene):
     assert (fresh.use_guard_band, fresh.guard_band_unit, fresh.guard_band_pixels) == (False, "PIXELS", 64)
     assert fresh.guard_band_percent == 3.0
     assert (fresh.save_motion, fresh.save_exit) == (False, False)
+    assert (fresh.use_noise_threshold, fresh.noise_threshold) == (False, pytest.approx(0.01))
     how, default = settings.viewport(plane_scene, 8, 8), RenderSettings(8, 8)
     for name in LIGHT_SETTINGS:
         assert getattr(how, name) == pytest.approx(getattr(default, name)), name
@@ -181,6 +201,16 @@ def test_every_shipped_preset_sets_existing_properties(registered):
             names = re.findall(r"^settings\.(\w+) =", path.read_text(encoding="utf-8"), re.MULTILINE)
             assert names, path
             assert all(name in settings.bl_rna.properties for name in names), path
+
+
+@pytest.mark.parametrize("cls", [cls for cls in operators.CLASSES if hasattr(cls, "preset_values")])
+def test_presets_of_ones_own_keep_existing_properties(registered, cls):
+    assert cls.preset_values
+    for value in cls.preset_values:
+        owner, *path, name = value.split(".")
+        assert owner == "settings"
+        group = reduce(getattr, path, bpy.context.scene.deep_gbuffer)
+        assert not group.bl_rna.properties[name].is_readonly
 
 
 def test_copying_statistics_needs_a_render(plane_scene):

@@ -54,11 +54,12 @@ class Case:
 
 
 def open_cornell(size: tuple[int, int]) -> bpy.types.Scene:
-    """Our Cornell box, to be rendered by our engine."""
+    """Our Cornell box, to be rendered by our engine with direct light only."""
     root = Path(__file__).resolve().parents[2]
     bpy.ops.wm.open_mainfile(filepath=str(root / "scenes" / "cornell_box.blend"))
     scene = bpy.context.scene
     scene.render.engine = "DEEP_GBUFFER"
+    scene.deep_gbuffer.indirect.method = "NONE"
     scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
     use_multilayer(scene)

@@ -65,12 +65,13 @@ def f12(name: str) -> Iterator[None]:
 
 
 def build_scene() -> None:
-    """The default cube in colour, on a floor, and nothing in front of the picture."""
+    """The default cube in colour, on a floor, lit directly only, and nothing in front of the picture."""
     scene = bpy.context.scene
     scene.render.engine = "DEEP_GBUFFER"
     scene.render.preview_pixel_size = "1"
     scene.render.dither_intensity = 0.0
     scene.deep_gbuffer.samples = scene.deep_gbuffer.viewport_samples = SAMPLES
+    scene.deep_gbuffer.indirect.method = "NONE"
     color("Material", (0.8, 0.1, 0.05))
     bpy.ops.mesh.primitive_plane_add(size=12.0, location=(0.0, 0.0, -1.0))
     bpy.context.view_layer.objects.active = bpy.data.objects["Cube"]

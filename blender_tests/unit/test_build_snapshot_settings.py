@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from addon.scene import Moment, RenderSettings, Sequence, snapshot
+from addon.scene import IndirectMethod, IndirectSettings, Moment, RenderSettings, Sequence, snapshot
 from addon.scene.settings import DebugView, Layering, Variant
 from blender_tests import builders
 from tooling.snapshot_job import JobError, frames_of, settings_of
@@ -40,6 +40,20 @@ def test_how_layers_are_generated_can_be_set():
     )
     assert (chosen.variant, chosen.layering) == (Variant.REPROJECT, Layering.VERTEX_SHADER)
     assert (chosen.guard_band, chosen.relative_separation) == (16, True)
+
+
+def test_indirect_light_can_be_set_by_dots():
+    chosen = settings(("indirect.method", "DEEP_MARCH"), ("indirect.rays", "3"), ("indirect.spatial_filter", "off"))
+    assert chosen == replace(
+        RenderSettings(64, 32),
+        indirect=IndirectSettings(method=IndirectMethod.DEEP_MARCH, rays=3, spatial_filter=False),
+    )
+
+
+@pytest.mark.parametrize("name", ["indirect", "indirect.ray", "indirect.", "layers.rays", ".layers"])
+def test_a_path_that_leads_nowhere_is_refused(name):
+    with pytest.raises(JobError, match=f"no setting '{name}'; it has .*"):
+        settings((name, "1"))
 
 
 def test_an_unknown_name_lists_the_known_ones():

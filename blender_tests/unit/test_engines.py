@@ -89,3 +89,19 @@ def test_an_unknown_name_lists_the_known_ones():
     assert group.layers == 3
     with pytest.raises(ValueError, match=r"Settings has no property 'lairs'; did you mean layers\?"):
         assign(group, "lairs", "3")
+
+
+def test_dots_lead_to_groups_within_groups():
+    inner = SimpleNamespace(bl_rna=SimpleNamespace(identifier="Numbers", properties=[prop("INT", identifier="rays")]))
+    properties = [prop("POINTER", identifier="render"), prop("POINTER", identifier="rna_type")]
+    outer = SimpleNamespace(bl_rna=SimpleNamespace(identifier="Settings", properties=properties), render=inner)
+    assign(outer, "render.rays", "3")
+    assert inner.rays == 3
+    with pytest.raises(ValueError, match=r"Numbers has no property 'ray'; did you mean rays\?"):
+        assign(outer, "render.ray", "3")
+    with pytest.raises(ValueError, match=r"Settings has no settings 'rnder'; did you mean render\?"):
+        assign(outer, "rnder.rays", "3")
+    with pytest.raises(ValueError, match=r"Settings has no settings 'rna_type'; it has render\."):
+        assign(outer, "rna_type.rays", "3")
+    with pytest.raises(ValueError, match=r"Settings has no property 'render'; it has none\."):
+        assign(outer, "render", "3")

@@ -5,7 +5,8 @@ import pytest
 
 from addon.report import sweep
 from addon.report.engines import ENGINES
-from addon.scene import Variant
+from addon.scene import IndirectMethod, Variant
+from addon.scene.quality import DEFAULT_QUALITY, QUALITIES
 
 
 @pytest.mark.parametrize("quick", [False, True])
@@ -35,9 +36,27 @@ def test_every_variant_is_measured():
     assert measured == {variant.value for variant in Variant}
 
 
+def test_every_method_is_measured_and_every_quality():
+    """March + grid and its default quality are the default, with which everything else is measured."""
+    found = [point.settings for point in sweep.points(quick=False)]
+    methods = {settings.get("indirect.method", "MARCH_GRID") for settings in found}
+    assert methods == {method.value for method in IndirectMethod}
+    qualities = {settings.get("indirect.render.preset", DEFAULT_QUALITY.value) for settings in found}
+    assert qualities == {quality.value for quality in QUALITIES}
+
+
+def test_layers_and_exit_surfaces_are_measured_together():
+    found = {
+        (settings.get("indirect.method"), settings.get("layers"), settings.get("indirect.exit_surfaces"))
+        for settings in (point.settings for point in sweep.points(quick=False))
+    }
+    for method in (None, "DEEP_MARCH"):
+        assert {(method, layers, exits) for layers in "124" for exits in (None, "False")} <= found
+
+
 def test_every_preset_file_is_measured():
     named = {(point.series, point.label) for series in sweep.SWEEP for point in series.points(quick=False)}
-    for series, folder in (("Quality preset", "sampling"), ("Layer preset", "layers")):
+    for series, folder in (("Sampling preset", "sampling"), ("Layer preset", "layers")):
         assert {(series, path.stem) for path in (sweep.PRESETS / folder).glob("*.py")} <= named
 
 

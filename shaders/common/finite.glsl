@@ -8,3 +8,9 @@ vec3 finite_radiance(vec3 radiance)
 {
     return any(isnan(radiance)) ? vec3(0.0) : min(radiance, vec3(LARGEST_RADIANCE));
 }
+
+/** Whether all components are numbers no larger than `finite_radiance` lets through. */
+bool is_finite(vec4 value)
+{
+    return !any(isnan(value)) && all(lessThanEqual(abs(value), vec4(LARGEST_RADIANCE)));
+}

@@ -9,10 +9,6 @@
 uniform usampler2D face_planes;
 
 const int NO_FACE = -1;
-// Rays may miss a surface by this part of a cell, or they would slip through between two planes that were fitted to a
-// curved one.
-const float PLANE_TOLERANCE = 0.1;
-
 /** The plane of a face. */
 Plane fetch_plane(int face)
 {
@@ -43,10 +39,13 @@ bool grid_has(ivec3 cell, int level)
     return all(greaterThanEqual(cell, ivec3(0))) && all(lessThan(cell, ivec3(grid_sizes[level].xyz)));
 }
 
-/** Bits of the orientations that a ray may meet from their front. */
+/** Bits of the orientations that a ray may meet from their front: normals are up to 54.7° away from their axis. */
 uint facing_orientations(vec3 direction)
 {
-    return (direction.x < 0.0 ? 1u : 2u) | (direction.y < 0.0 ? 4u : 8u) | (direction.z < 0.0 ? 16u : 32u);
+    const float SINE = 0.8165;
+    uvec3 positive = mix(uvec3(0u), uvec3(1u, 4u, 16u), lessThan(direction, vec3(SINE)));
+    uvec3 negative = mix(uvec3(0u), uvec3(2u, 8u, 32u), greaterThan(direction, vec3(-SINE)));
+    return positive.x | positive.y | positive.z | negative.x | negative.y | negative.z;
 }
 
 struct GridHit
@@ -98,8 +97,7 @@ GridHit trace_grid(vec3 origin, vec3 direction, int first_level, float start)
                 float approach = dot(plane.normal, direction);
                 float meets = (plane.distance - dot(plane.normal, from)) / min(approach, -1e-6);
                 vec3 point = from + meets * direction;
-                bool inside = all(greaterThanEqual(point, plane.low - PLANE_TOLERANCE))
-                              && all(lessThanEqual(point, plane.high + PLANE_TOLERANCE));
+                bool inside = all(greaterThanEqual(point, plane.low)) && all(lessThanEqual(point, plane.high));
                 if (inside && approach < 0.0 && meets >= enter && meets * cell_size < hit.distance)
                     hit = GridHit(face, meets * cell_size);
             }

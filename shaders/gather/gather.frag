@@ -70,10 +70,16 @@ float depth_behind_face(vec3 position, vec3 normal, int level)
 }
 
 #ifdef CONTACT
-/** Radiance that a layer's surface sends: what lights it directly, and what the grid knows of the rest. */
-vec3 layer_radiance(ivec3 texel, vec3 position, int level)
+/**
+ * Radiance that a layer's surface sends against a ray: what lights it directly, and what the grid knows of the rest.
+ *
+ * 0 where the ray meets its back, of which nothing is known.
+ */
+vec3 layer_radiance(ivec3 texel, vec3 position, vec3 direction, int level)
 {
     vec3 normal = decode_octahedral(texelFetch(normal_layers, texel, 0).rg);
+    if (dot(normal, direction) >= 0.0)
+        return vec3(0.0);
     float metallic = texelFetch(material_layers, texel, 0).r;
     vec3 albedo = texelFetch(base_color_layers, texel, 0).rgb * (1.0 - metallic);
     int face = face_at(position, normal, level);
@@ -105,16 +111,18 @@ void main()
         float start = 0.0;
         bool met = false;
 #ifdef CONTACT
-        float jitter = ray_random(texel, ray, gather_rays).x;
+        // Not what chose the ray's direction, or where it looks would decide where it steps.
+        float jitter = fract(hash_to_unit(uvec2(texel)).x + gather_shift.x + float(ray) * 0.6180339887498949);
         float reach = CONTACT_REACH * grid_cell_size(level);
-        MarchHit near = deep_march(position, direction, reach, contact_steps, jitter);
+        vec3 origin = march_origin(position, normal, view_depth);
+        MarchHit near = deep_march(origin, direction, reach, contact_steps, jitter);
         met = near.hit;
         if (near.hit) {
-            radiance = layer_radiance(ivec3(near.pixel, near.layer), position + near.distance * direction, level);
+            radiance = layer_radiance(ivec3(near.pixel, near.layer), origin + near.distance * direction, direction, level);
             marched += 1.0;
             origins.r += 1.0;
         }
-        start = near.ended ? 0.0 : reach;
+        start = near.distance;
 #endif
         if (!met) {
             GridHit far = trace_grid(position + offset * normal, direction, level, start);

@@ -11,17 +11,21 @@ struct Plane
     vec3 high;
 };
 
-/** Numbers in -0.5…0.5 as ten bits each; `rounding` 0: down, 1: up. */
+// Boxes reach so far beyond their cells at most, cells.
+const float LARGEST_EXCESS = 0.125;
+
+/** Numbers in −½ − LARGEST_EXCESS … ½ + LARGEST_EXCESS as ten bits each; `rounding` 0: down, 1: up. */
 uint pack_place(vec3 place, float rounding)
 {
-    uvec3 steps = uvec3(floor(clamp(place + 0.5, 0.0, 1.0) * 1022.0 + rounding));
+    uvec3 steps = uvec3(floor(clamp(place / (1.0 + 2.0 * LARGEST_EXCESS) + 0.5, 0.0, 1.0) * 1022.0 + rounding));
     return steps.x | steps.y << 10u | steps.z << 20u;
 }
 
 /** What `pack_place` packed. */
 vec3 unpack_place(uint packed_place)
 {
-    return vec3(packed_place & 1023u, packed_place >> 10u & 1023u, packed_place >> 20u & 1023u) / 1022.0 - 0.5;
+    vec3 steps = vec3(packed_place & 1023u, packed_place >> 10u & 1023u, packed_place >> 20u & 1023u);
+    return (steps / 1022.0 - 0.5) * (1.0 + 2.0 * LARGEST_EXCESS);
 }
 
 uvec4 encode_plane(Plane plane)

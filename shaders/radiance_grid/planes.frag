@@ -19,6 +19,21 @@ layout(location = 1) out vec4 out_point;
 layout(location = 2) out vec4 out_albedo;
 layout(location = 3) out vec4 out_emission;
 
+// Where surfaces go on in the next cell, rays may miss them by this part of a cell, or they would slip through between two
+// planes that were fitted to a curved one.
+const float PLANE_TOLERANCE = 0.1;
+
+/**
+ * How far a surface reaches towards a cell's sides, whose outermost points are at `extent` (0…½) from its centre.
+ *
+ * Half the points' spacing farther, on average; nearer to a side than all of it, it goes on in the next cell as far as
+ * points can tell.
+ */
+vec3 reach(vec3 extent)
+{
+    return mix(extent + 0.5 * POINT_SPACING, vec3(0.5 + PLANE_TOLERANCE), greaterThan(extent, vec3(0.5 - POINT_SPACING)));
+}
+
 void main()
 {
     int face = int(gl_FragCoord.y) * FACES_PER_ROW + int(gl_FragCoord.x);
@@ -37,8 +52,8 @@ void main()
     normal /= max(length(normal), 1e-37);
     vec3 offset = (offsets.xyz + other_offsets.xyz) / area;
     vec3 high = max(texelFetch(most, own, 0).xyz, texelFetch(most, other, 0).xyz) - 0.5;
-    vec3 low = 0.5 - max(texelFetch(least, own, 0).xyz, texelFetch(least, other, 0).xyz);
-    out_plane = encode_plane(Plane(normal, dot(normal, offset), low - HALF_SPACING, high + HALF_SPACING));
+    vec3 low = max(texelFetch(least, own, 0).xyz, texelFetch(least, other, 0).xyz) - 0.5;
+    out_plane = encode_plane(Plane(normal, dot(normal, offset), -reach(low), reach(high)));
     out_point = vec4(offset, base_color.a);
     out_albedo = vec4(base_color.rgb / area, 1.0);
     out_emission = vec4((emissions.rgb + vec3(other_offsets.a, other_normals.a, other_emissions.a)) / area, 0.0);

@@ -6,8 +6,8 @@ INTRODUCTION = (
     "Each scene below was rendered in many ways: by Deep G-Buffer with different settings, and by Blender's own "
     "engines Cycles, EEVEE and Workbench. Every picture is compared with a reference, a Cycles render of the same "
     "scene with many samples, and every render is timed. What counts is both together: which picture is closest to "
-    "the reference after a given time. Deep G-Buffer does not render indirect light, reflections of the scene or "
-    "transparency yet: where a scene has them, its pictures differ however many samples it takes."
+    "the reference after a given time. Deep G-Buffer does not render reflections of the scene or transparency yet: "
+    "where a scene has them, its pictures differ however many samples it takes."
 )
 QUICK = (
     "This is a quick report: few points, each rendered in one process (smaller pictures and a reference of fewer "
@@ -86,6 +86,12 @@ TERMS = (
         "",
         "Cycles renders without clamping and adaptive sampling; its denoiser is OpenImageDenoise with prefilter and "
         "quality Fast. EEVEE renders with ray tracing and without baked probes. Everything else is as in the file.",
+    ),
+    (
+        "March + grid, deep march, radiosity, ambient occlusion, SSAO",
+        "",
+        "The ways in which Deep G-Buffer finds indirect light; where a series does not name one, it is march + grid. "
+        "Exit surfaces tell its rays where objects end behind their visible side.",
     ),
     (
         "Resolution scale",

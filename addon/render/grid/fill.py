@@ -54,8 +54,8 @@ GRID_POINTS_UNIFORMS = UniformBlock(
 LARGEST_REFLECTANCE = 0.999
 """A surface that sends back all light or more would never come to rest."""
 
-_PLANE_DEFINES = frozenset({f"HALF_SPACING {0.5 / sqrt(POINTS_PER_CELL)}"})
-"""Cells that a surface goes on beyond its outermost point, on average."""
+_PLANE_DEFINES = frozenset({f"POINT_SPACING {1.0 / sqrt(POINTS_PER_CELL)}"})
+"""Cells between points, about."""
 
 _OCCUPANCY_WIDTH = 4096
 _POINTS_BINDING, _MATERIAL_BINDING = 0, 1

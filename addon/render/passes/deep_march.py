@@ -14,6 +14,7 @@ from ..programs import ProgramSpec
 from ..uniforms import UniformBlock
 from .base import Frame, subsets
 from .fullscreen import FullscreenPass, fullscreen_program
+from .radiosity import BOUNCED_SAMPLER, bounce_count
 
 DEEP_MARCH_UNIFORMS = UniformBlock(
     "DeepMarchUniforms",
@@ -26,92 +27,77 @@ DEEP_MARCH_UNIFORMS = UniformBlock(
     ),
 )
 
-BOUNCED_SAMPLER = "bounced_layers"
+FARTHEST = 1e30
+"""Metres: no limit, as `common/deep_march.glsl` has it."""
+
+_ORIGIN_DEFINES = tuple(f"DEBUG_{view.value}" for view in (DebugView.MARCH_HITS, DebugView.LIGHT_ORIGIN))
 
 
 class DeepMarchPass(FullscreenPass):
-    """Gathers the irradiance of the nearest layer; for further bounces that of all layers before, as often as needed."""
+    """Writes the nearest layer's irradiance; for further bounces first that of all layers, as often as it takes."""
 
     name = "deep_march"
     block = DEEP_MARCH_UNIFORMS
 
     @classmethod
     def variants(cls) -> Iterator[ProgramSpec]:
-        """Every one for two layers; one, and more than two, with everything else."""
-        shown = ("", f"DEBUG_{DebugView.MARCH_HITS.value}", f"DEBUG_{DebugView.LIGHT_ORIGIN.value}")
+        """Everything there is for two layers; for other numbers of layers with and without exit surfaces."""
         for defines in subsets(("EXIT", "RADIANCE", "BOUNCED", "WORLD", ENVIRONMENT_DEFINE)):
-            for view in shown:
-                yield _program(defines | {"LAYERS 2", view} - {""})
-        for layers in (1, 3, 8):
-            yield _program(frozenset({f"LAYERS {layers}", "EXIT", "RADIANCE", "BOUNCED", "WORLD", ENVIRONMENT_DEFINE}))
+            if ENVIRONMENT_DEFINE not in defines or "WORLD" in defines:
+                yield _program(defines | {"LAYERS 2"})
+        for shown in _ORIGIN_DEFINES:
+            yield _program(frozenset({shown, "LAYERS 2", "EXIT", "RADIANCE", "BOUNCED", "WORLD"}))
+        for layers in ("LAYERS 1", "LAYERS 3", "LAYERS 8"):
+            for defines in subsets(("EXIT",)):
+                yield _program(defines | {layers, "RADIANCE", "WORLD"})
 
     def run(self, frame: Frame, planned: PlannedPass) -> None:
-        """Bounce, then gather what is seen."""
+        """Gather once for each bounce; all but the last in all layers and for few texels, which bounds what it takes:
+        at most 1/8² of the rays of a full-resolution picture per bounce and layer."""
         self._device.context.enable_only(moderngl.NOTHING)
-        defines = set(planned.defines)
-        if "direct.radiance" in planned.reads:
-            defines.add("RADIANCE")
-        bounced = self._bounce(frame, planned, frozenset(name for name in defines if not name.startswith("DEBUG_")))
-        spec = _program(frozenset(defines | ({"BOUNCED"} if bounced else set[str]())))
-        shown = tuple((target.name, 0) for target in planned.writes if target.name not in BOUNCE_TARGETS)
-        self._gather(frame, planned, spec, shown, bounced, gather_uniforms(frame), 0)
-
-    def _bounce(self, frame: Frame, planned: PlannedPass, defines: frozenset[str]) -> str:
-        """The target that holds the irradiance of all layers before the last bounce; empty where there is none."""
-        result, index = "", frame.sample.index
-        if not any(target.name in BOUNCE_TARGETS for target in planned.writes):
-            return result
-        for bounce in range(bounces_before_last(frame)):
-            target = BOUNCE_TARGETS[bounce % 2]
-            spec = _program(defines | ({"BOUNCED"} if result else set[str]()))
-            uniforms = gather_uniforms(frame) | {
-                "gather_divisor": BOUNCE_DIVISOR,
-                "gather_offset": gather_offset(BOUNCE_DIVISOR, index),
-                "gather_rays": frame.settings.indirect.rays,
-            }
+        lit = "direct.radiance" in planned.reads
+        defines = planned.defines | ({"RADIANCE"} if lit else set[str]())
+        gathering = gather_uniforms(frame)
+        offset = gather_offset(BOUNCE_DIVISOR, frame.sample.index)
+        coarse = gathering | {"gather_divisor": BOUNCE_DIVISOR, "gather_offset": offset}
+        before = None
+        for bounce in range(bounce_count(frame.settings.indirect.bounces, frame.scene) - 1):
+            into = BOUNCE_TARGETS[bounce % 2]
             for layer in range(frame.plan.indirect.layers):
-                self._gather(frame, planned, spec, ((target, layer),), result, uniforms, layer)
-            result = target
-        return result
+                self._gather(frame, planned, defines - set(_ORIGIN_DEFINES), before, ((into, layer),), coarse)
+            before = into
+        shown = tuple((target.name, 0) for target in planned.writes if target.name not in BOUNCE_TARGETS)
+        self._gather(frame, planned, defines, before, shown, gathering)
 
     def _gather(
         self,
         frame: Frame,
         planned: PlannedPass,
-        spec: ProgramSpec,
+        defines: frozenset[str],
+        before: str | None,
         into: tuple[tuple[str, int], ...],
-        bounced: str,
-        uniforms: dict[str, object],
-        layer: int,
+        gathering: dict[str, object],
     ) -> None:
+        """One bounce; `before`: the target of the bounce before, None where there is none."""
+        spec = _program(defines | ({"BOUNCED"} if before else set[str]()))
         self._fullscreen.bind(frame, spec, planned)
-        if bounced:
-            frame.pool.texture(bounced).use(spec.samplers.index(BOUNCED_SAMPLER))
-        world = frame.scene.world
+        if before:
+            frame.pool.texture(before).use(spec.samplers.index(BOUNCED_SAMPLER))
+        world, indirect = frame.scene.world, frame.settings.indirect
         if ENVIRONMENT_DEFINE in spec.defines and world.environment is not None:
             frame.environment.bind(world.environment, spec)
         frame.pool.framebuffer(into).use()
         self._fullscreen.draw(
             spec,
             **environment_uniforms(world),
-            **uniforms,
-            march_reach=frame.settings.indirect.march_distance or FARTHEST,
-            march_steps=frame.settings.indirect.march_steps,
-            layer=layer,
+            **gathering,
+            march_reach=indirect.march_distance or FARTHEST,
+            march_steps=indirect.march_steps,
+            layer=into[0][1],
         )
 
 
-FARTHEST = 1e30
-"""Metres: no limit, as `common/deep_march.glsl` has it."""
-
-
-def bounces_before_last(frame: Frame) -> int:
-    """How often light bounces among the layers before it is gathered."""
-    bounces = frame.settings.indirect.bounces
-    return 8 if bounces is None else bounces - 1
-
-
 def _program(defines: frozenset[str]) -> ProgramSpec:
-    return fullscreen_program(
-        "deep_march/deep_march.frag", DEEP_MARCH_UNIFORMS, defines, samplers=(MAP_SAMPLER, BOUNCED_SAMPLER)
-    )
+    defines |= {f"BOUNCE_DIVISOR {BOUNCE_DIVISOR}"}
+    samplers = (MAP_SAMPLER, BOUNCED_SAMPLER)
+    return fullscreen_program("deep_march/deep_march.frag", DEEP_MARCH_UNIFORMS, defines, samplers=samplers)

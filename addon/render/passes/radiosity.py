@@ -41,13 +41,14 @@ class RadiosityPass(FullscreenPass):
     @classmethod
     def variants(cls) -> Iterator[ProgramSpec]:
         """The first bounce and later ones, in both composites."""
+        sent = [
+            set[str](),
+            {"RADIANCE"},
+            *({"RADIANCE", "BOUNCED"} | material for material in subsets(MATERIAL_DEFINES)),
+        ]
+        composites = [set[str](), {"PAPER"}, {"PAPER", "WORLD"}, {"PAPER", "WORLD", ENVIRONMENT_DEFINE}]
         for layers in ("LAYERS 1", "LAYERS 2"):
-            for material in subsets(MATERIAL_DEFINES):
-                yield _program(material | {layers, "RADIANCE", "BOUNCED"})
-            yield _program(frozenset({layers, "RADIANCE"}))
-            for world in (set[str](), {"WORLD"}, {"WORLD", ENVIRONMENT_DEFINE}):
-                for sent in (set[str](), {"RADIANCE"}, {"RADIANCE", "BOUNCED"}):
-                    yield _program(frozenset(world | sent | {layers, "PAPER"}))
+            yield from (_program(frozenset({layers} | first | last)) for first in sent for last in composites)
             yield _paper_direct_program(frozenset({layers}))
 
     def run(self, frame: Frame, planned: PlannedPass) -> None:
