@@ -90,6 +90,22 @@ class IndirectNeeds:
         return self.method is not IndirectMethod.NONE
 
 
+LARGEST_REFLECTANCE = 0.999
+"""Light between surfaces that send back all of it or more would never come to rest."""
+
+
+def reflectance_warnings(scene: Scene, needs: IndirectNeeds) -> tuple[str, ...]:
+    """A sentence for each material whose base colour indirect light takes for darker than it is."""
+    if not needs.reads_grid:
+        return ()
+    return tuple(
+        f'Material "{material.name}" sends back all light or more (base colour {max(material.base_color):g}): '
+        f"for indirect light {LARGEST_REFLECTANCE} is used."
+        for material in scene.materials.values()
+        if max(material.base_color) > LARGEST_REFLECTANCE
+    )
+
+
 def reads_layers(indirect: IndirectSettings) -> bool:
     """Whether a method looks behind the nearest layer."""
     if indirect.method is IndirectMethod.MARCH_GRID:

@@ -14,6 +14,7 @@ from .environment import EnvironmentTextures
 from .film import Film
 from .geometry import GeometryStore
 from .images import ImageStore
+from .indirect_plan import reflectance_warnings
 from .layering import Trial, calibration_view, resolved
 from .lighting import Lighting
 from .memory import Memory
@@ -147,6 +148,11 @@ class Renderer:
         shadows = frame.shadows
         if shadows is not None:
             sizes["shadow maps"] = shadows.bytes
+        if frame.grid is not None:
+            finest = frame.grid.levels[0]
+            sizes[f"radiance grid ({len(frame.grid.levels)} levels, finest cells {finest.cell:.3g} m)"] = (
+                frame.grid.bytes
+            )
         sizes["geometry"] = self._geometry.bytes()
         sizes["images"] = self._images.bytes()
         if frame.scene.world.environment is not None:
@@ -159,7 +165,7 @@ class Renderer:
             draws=len(draws.seen),
             instances=sum(batch.count for batch in frame.scene.batches if batch.seen_by_camera),
             bytes=sizes,
-            warnings=self._warnings,
+            warnings=self._warnings + reflectance_warnings(frame.scene, frame.plan.indirect),
             device=self._device.name,
             shadow_maps_drawn=shadows.drawn if shadows else 0,
             shadow_maps_kept=shadows.kept if shadows else 0,

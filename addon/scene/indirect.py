@@ -55,7 +55,7 @@ class IndirectSettings:
     march_steps: int = 32
     march_distance: float = 0.0
     contact_steps: int = 4
-    exit_surfaces: bool = True
+    exit_surfaces: bool = False
     cell_size: float = 0.0
     cells: int = 64
     cell_rays: int = 32

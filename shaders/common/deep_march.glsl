@@ -60,8 +60,8 @@ struct MarchedRay
 {
     vec2 start;      // pixels
     vec2 way;        // pixels, to the end
-    vec2 depth;      // m at s = 0, and its change, before division
-    vec2 divisor;    // at s = 0, and its change
+    vec2 depth;      // m at s = 0 and 1, before division
+    vec2 divisor;    // at s = 0 and 1
     float distance;  // m at s = 1, before division
 };
 
@@ -78,29 +78,51 @@ MarchedRay marched_ray(vec3 start, vec3 way, float end)
     vec2 to = last.xy * nearness;
     ray.start = (from - camera_window.xz) * pixels;
     ray.way = (to - from) * pixels;
-    ray.depth = parallel ? vec2(start.z, way.z * end) : vec2(1.0, 0.0);
-    ray.divisor = parallel ? vec2(1.0, 0.0) : vec2(1.0 / start.z, nearness / end - 1.0 / start.z);
+    ray.depth = parallel ? vec2(start.z, last.z * end) : vec2(1.0);
+    ray.divisor = parallel ? vec2(1.0) : vec2(1.0 / start.z, nearness / end);
     ray.distance = nearness;
     return ray;
 }
 
 /**
  * Between which view depths (m) each layer at a pixel is solid: to its exit surface, where no other layer comes before
- * that. What has no back, or without EXIT anything, is a sheet: `sheet` (m) thick at most.
+ * that. What has no back, or without EXIT anything, is a sheet: as thick as so many pixels are wide, at most. A layer that
+ * shows the back of the one before, which is no surface to enter by, begins where that one does and ends at once.
  */
-void layer_slabs(ivec2 pixel, float sheet, out float begin[LAYERS], out float end[LAYERS])
+void layer_slabs(ivec2 pixel, float pixels, out float begin[LAYERS], out float end[LAYERS])
 {
     float next = FARTHEST;
     for (int k = LAYERS - 1; k >= 0; --k) {
         float view_depth = texelFetch(view_depth_layers, ivec3(pixel, k), 0).r;
         begin[k] = view_depth;
-        end[k] = min(view_depth + sheet, next);
+        end[k] = min(view_depth + pixels * pixel_width(view_depth), next);
 #ifdef EXIT
         float leaves = texelFetch(exit_view_depth_layers, ivec3(pixel, k), 0).r;
-        end[k] = leaves > next ? end[k] : leaves;
+        float rounding = 4.0 * FLOAT_EPSILON * next;
+        end[k] = leaves > next + rounding ? end[k] : leaves;
+        int farther = min(k + 1, LAYERS - 1);
+        bool back = abs(leaves - next) <= rounding;
+        begin[farther] = back ? view_depth : begin[farther];
+        end[farther] = back ? -FARTHEST : end[farther];
 #endif
         next = min(view_depth, FARTHEST);
     }
+}
+
+/**
+ * Whether a ray, at view depth `before` (m) at the step before, was in front of the surface that layer k now shows.
+ *
+ * `was`, `is`: view depths of the layers' surfaces (m) then and now. A surface goes on in the same layer where that is
+ * nearer to what it was than the next layer is; otherwise an occluder came before it, and it goes on in the next layer;
+ * or one went away, and it goes on in the layer before.
+ */
+bool went_through(float before, float was[LAYERS], float is[LAYERS], int k)
+{
+    int nearer = max(k - 1, 0), farther = min(k + 1, LAYERS - 1);
+    float change = abs(is[k] - was[k]);
+    return (before < was[k] && change < abs(is[farther] - was[k]))
+           || (before < was[nearer] && abs(is[k] - was[nearer]) < abs(is[nearer] - was[nearer]))
+           || (before < was[farther] && abs(is[k] - was[farther]) < change);
 }
 
 /**
@@ -111,9 +133,7 @@ void layer_slabs(ivec2 pixel, float sheet, out float begin[LAYERS], out float en
  * more densely; `jitter` in [0, 1) moves them, but the last is always at the end of the way.
  *
  * A ray enters a layer where it is behind its surface at a step, if it was not behind all of the slab at the step
- * before; or if it was in front of the surface then, and the surface then and the one now are the same. They are where
- * the next layer now is farther from what the layer was than the layer itself: otherwise an occluder has come in
- * between, behind which the surface goes on as the next layer.
+ * before; or if it was in front of that surface then, see `went_through`.
  */
 MarchHit deep_march(vec3 origin, vec3 direction, float reach, int steps, float jitter)
 {
@@ -136,21 +156,20 @@ MarchHit deep_march(vec3 origin, vec3 direction, float reach, int steps, float j
     for (float taken = 1.0; taken <= count && !hit.hit; taken += 1.0) {
         float u = (taken - jitter) / (count - jitter);
         float s = u * mix(u, 1.0, even);
-        float scale = 1.0 / (ray.divisor.x + s * ray.divisor.y);
-        float depth = (ray.depth.x + s * ray.depth.y) * scale;
+        vec2 parts = vec2(1.0 - s, s);
+        float scale = 1.0 / dot(ray.divisor, parts);
+        float depth = dot(ray.depth, parts) * scale;
         ivec2 pixel = clamp(ivec2(ray.start + s * ray.way), ivec2(0), last_pixel);
-        // What is smaller than the distance between two steps is taken to be as deep as that.
-        float sheet = pixel_width(depth) * pixels * mix(2.0 * u, 1.0, even) / count;
         float begin[LAYERS], end[LAYERS];
-        layer_slabs(pixel, sheet, begin, end);
+        // What may slip through between this step and the next: what is thinner than they are apart.
+        layer_slabs(pixel, pixels * mix(2.0 * u, 1.0, even) / count, begin, end);
         for (int k = 0; k < LAYERS; ++k) {
-            bool same = abs(begin[k] - was[k]) < abs(begin[min(k + 1, LAYERS - 1)] - was[k]);
-            bool entered = min(before, depth) <= end[k] || (same && before < was[k]);
-            if (!hit.hit && begin[k] <= depth && entered)
+            bool entered = min(before, depth) <= end[k] || went_through(before, was, begin, k);
+            if (!hit.hit && begin[k] < depth && entered)
                 hit = MarchHit(true, false, s * ray.distance * scale, k, pixel);
-            was[k] = begin[k];
         }
         before = depth;
+        was = begin;
     }
     return hit;
 }

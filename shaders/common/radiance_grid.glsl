@@ -43,8 +43,8 @@ bool grid_has(ivec3 cell, int level)
 uint facing_orientations(vec3 direction)
 {
     const float SINE = 0.8165;
-    uvec3 positive = mix(uvec3(0u), uvec3(1u, 4u, 16u), lessThan(direction, vec3(SINE)));
-    uvec3 negative = mix(uvec3(0u), uvec3(2u, 8u, 32u), greaterThan(direction, vec3(-SINE)));
+    uvec3 positive = uvec3(1u, 4u, 16u) * uvec3(lessThan(direction, vec3(SINE)));
+    uvec3 negative = uvec3(2u, 8u, 32u) * uvec3(greaterThan(direction, vec3(-SINE)));
     return positive.x | positive.y | positive.z | negative.x | negative.y | negative.z;
 }
 

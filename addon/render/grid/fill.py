@@ -18,6 +18,7 @@ from ...scene.arrays import Float32Array, Float64Array, UInt8Array
 from ..device import Device
 from ..draws import MATERIAL_UNIFORMS, Draw
 from ..geometry import INSTANCE_ATTRIBUTES, drawing_order, split_float64
+from ..indirect_plan import LARGEST_REFLECTANCE
 from ..mesh_lights import MeshLight
 from ..passes.base import Frame, UniformBuffer
 from ..passes.rasterize import SURFACES
@@ -51,8 +52,6 @@ GRID_POINTS_UNIFORMS = UniformBlock(
     ),
 )
 
-LARGEST_REFLECTANCE = 0.999
-"""A surface that sends back all light or more would never come to rest."""
 
 _PLANE_DEFINES = frozenset({f"POINT_SPACING {1.0 / sqrt(POINTS_PER_CELL)}"})
 """Cells between points, about."""

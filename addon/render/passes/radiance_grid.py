@@ -23,6 +23,9 @@ from ..readback import read_target
 from ..receivers import visible_receivers
 from .base import Frame
 
+_SAME_CELLS = 1.5
+"""A viewport keeps its cells until they are so many times larger or smaller than they should be."""
+
 _SEEN_SHARE = 0.8
 """Share of the picture whose depth decides how fine the cells are: what is farther may be any distance away."""
 
@@ -42,6 +45,7 @@ class RadianceGridPass:
         self._radiance = GridRadiance(device)
         self._grids: dict[int, _LitGrid] = {}
         self._seen: _Seen | None = None
+        self._cell: float | None = None
 
     @classmethod
     def variants(cls) -> Iterator[ProgramSpec]:
@@ -55,7 +59,8 @@ class RadianceGridPass:
     def run(self, frame: Frame, planned: PlannedPass) -> None:
         """Have the grid as this sample needs it. The first lattice's is kept for the next view."""
         if self._seen is None:
-            self._seen = _look(frame)
+            self._seen = _look(frame, self._cell if frame.continuous else None)
+            self._cell = self._seen.cell
         lattice = frame.sample.index // SAMPLES_PER_LATTICE
         for other in self._grids.keys() - {0, lattice}:
             self._grids.pop(other).textures.release()
@@ -100,24 +105,29 @@ class _LitGrid:
 
 @dataclass(frozen=True)
 class _Seen:
-    """What a view's grid is fitted to: boxes (2, 3) in world space around the scene and around what is seen."""
+    """What a view's grid is fitted to: the box (2, 3) in world space around the scene, the middle (3,) of what is seen,
+    and how large (m) the finest cells are."""
 
     bounds: Float64Array
-    seen: Float64Array
+    center: Float64Array
+    cell: float
 
 
-def _look(frame: Frame) -> _Seen:
-    bounds = scene_bounds(frame.scene)
+def _look(frame: Frame, before: float | None) -> _Seen:
+    """What a view's grid is fitted to. `before` (m): cells of the view before it in a viewport."""
+    bounds, indirect = scene_bounds(frame.scene), frame.settings.indirect
     seen = _seen_box(frame)
-    return _Seen(bounds, bounds if seen is None else seen)
+    seen = bounds if seen is None else seen
+    cell = indirect.cell_size or cell_size(seen, indirect.cells)
+    if before is not None and not indirect.cell_size and 1.0 / _SAME_CELLS <= before / cell <= _SAME_CELLS:
+        cell = before
+    return _Seen(bounds, seen.mean(axis=0), cell)
 
 
 def _levels(frame: Frame, seen: _Seen, lattice: int) -> tuple[GridLevel, ...]:
     """Where the grid is."""
     indirect = frame.settings.indirect
-    cell = indirect.cell_size or cell_size(seen.seen, indirect.cells)
-    memory = indirect.grid_memory << 20
-    return grid_levels(seen.bounds, seen.seen.mean(axis=0), cell, indirect.cells, memory, lattice)
+    return grid_levels(seen.bounds, seen.center, seen.cell, indirect.cells, indirect.grid_memory << 20, lattice)
 
 
 def _seen_box(frame: Frame) -> Float64Array | None:
