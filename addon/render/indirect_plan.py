@@ -4,7 +4,7 @@
 from dataclasses import dataclass
 
 from ..scene import DebugView, IndirectMethod, IndirectSettings, Material, RenderSettings, Scene, ShadingModel
-from ..scene.indirect import RAY_METHODS, WORLD_METHODS
+from ..scene.indirect import BOUNCING_METHODS, RAY_METHODS, WORLD_METHODS
 from .layout import TargetSpec
 from .planned_pass import LeftOut, PlannedPass
 
@@ -70,7 +70,7 @@ class IndirectNeeds:
 
     `method`: NONE where there is none. `layers` that it reads, and whether their `exit` surfaces. `world_gathered`:
     whether it finds the world's diffuse light, so that `direct` need not. `channels` of the G-buffer that it reads in
-    all its layers.
+    all its layers. `reads_layers`: whether it looks for surfaces in the layers.
     """
 
     method: IndirectMethod = IndirectMethod.NONE
@@ -78,11 +78,17 @@ class IndirectNeeds:
     exit: bool = False
     world_gathered: bool = False
     channels: tuple[str, ...] = ()
+    reads_layers: bool = False
 
     @property
     def reads_grid(self) -> bool:
         """Whether there must be a radiance grid."""
         return self.method is IndirectMethod.MARCH_GRID
+
+    @property
+    def layers_send(self) -> bool:
+        """Whether light is taken from the layers."""
+        return "material" in self.channels and self.reads_layers
 
     @property
     def any(self) -> bool:
@@ -96,7 +102,7 @@ LARGEST_REFLECTANCE = 0.999
 
 def reflectance_warnings(scene: Scene, needs: IndirectNeeds) -> tuple[str, ...]:
     """A sentence for each material whose base colour indirect light takes for darker than it is."""
-    if not needs.reads_grid:
+    if needs.method not in BOUNCING_METHODS:
         return ()
     return tuple(
         f'Material "{material.name}" sends back all light or more (base colour {max(material.base_color):g}): '
@@ -133,7 +139,8 @@ def indirect_needs(scene: Scene, settings: RenderSettings, left_out: list[LeftOu
         layers=settings.layers if layered else 1,
         exit=method in RAY_METHODS and indirect.exit_surfaces and layered,
         world_gathered=gathers_world(indirect) and scene.world.shines and scene.world.seen_by_diffuse,
-        channels=("normal",) if method in (IndirectMethod.OCCLUSION, IndirectMethod.SSAO) else surfaces,
+        channels=("normal",) if method in _OCCLUSIONS else surfaces,
+        reads_layers=layered,
     )
 
 
@@ -144,9 +151,13 @@ def plan_indirect(
     left_out: list[LeftOut],
     *,
     direct: PlannedPass | None,
+    samples_emission: bool,
     continuous: bool,
 ) -> tuple[PlannedPass, ...]:
-    """The passes in order; the last one writes `IRRADIANCE_TARGET`. `direct`: what shades the layers, if anything."""
+    """The passes in order; the last one writes `IRRADIANCE_TARGET`.
+
+    `direct`: what shades the layers, if anything; `samples_emission`: whether it samples emissive surfaces as lights.
+    """
     if not needs.any:
         return ()
     indirect, name = settings.indirect, _PASS_OF_METHOD[needs.method]
@@ -163,20 +174,24 @@ def plan_indirect(
     written = GATHERED_TARGET if blends or filters else IRRADIANCE_TARGET
     spec = TargetSpec(written, 4, "f4", divisor=indirect.divisor)
     origin = settings.debug_view in _ORIGIN_VIEWS.get(needs.method, ())
+    reflects = direct is not None and needs.layers_send
     method = PlannedPass(
         name,
         reads=(
             "gbuffer.view_depth",
             *(f"gbuffer.{channel}" for channel in needs.channels),
             *(("exit.view_depth",) if needs.exit else ()),
-            *(("direct.radiance",) if direct is not None and needs.method not in _OCCLUSIONS else ()),
+            *(("direct.radiance",) if reflects else ()),
+            *(("gbuffer.emission",) if reflects and samples_emission else ()),
         ),
         writes=(
             spec,
             *((TargetSpec(ORIGIN_TARGET, 4, "f4", divisor=indirect.divisor),) if origin else ()),
             *_bounce_targets(indirect, needs),
         ),
-        defines=_method_defines(scene, settings, needs),
+        defines=_method_defines(scene, settings, needs)
+        | ({"RADIANCE"} if reflects else set[str]())
+        | ({"SAMPLED_EMISSION"} if reflects and samples_emission else set[str]()),
     )
     return (*grid, method, *plan_filters(settings, written, left_out, blends=blends, filters=filters))
 

@@ -140,7 +140,15 @@ def plan(
     left_out += [LeftOut(name, reason) for name, reason in dark]
     lighting = plan_lighting_passes(scene, settings, lights, layers, left_out, tiled=indirect.reads_grid)
     direct = next((planned for planned in lighting if planned.name in SHADING_PASSES), None)
-    bounced = plan_indirect(scene, settings, indirect, left_out, direct=direct, continuous=continuous)
+    bounced = plan_indirect(
+        scene,
+        settings,
+        indirect,
+        left_out,
+        direct=direct,
+        samples_emission=bool(lights.mesh_lights),
+        continuous=continuous,
+    )
     channels = _read_channels(scene, settings, [*lighting, *bounced], layers, left_out)
     one_pass = variant is not Variant.TWO_PASS
     drawn_layers = layers + look_ahead if one_pass else layers

@@ -26,6 +26,9 @@ class IndirectMethod(StrEnum):
 RAY_METHODS = frozenset({IndirectMethod.DEEP_MARCH, IndirectMethod.MARCH_GRID})
 """Methods that send rays."""
 
+BOUNCING_METHODS = RAY_METHODS | {IndirectMethod.RADIOSITY}
+"""Methods that find light which surfaces reflect."""
+
 WORLD_METHODS = RAY_METHODS | {IndirectMethod.OCCLUSION, IndirectMethod.SSAO}
 """Methods that find the world's diffuse light themselves; with the others it is sampled as direct light."""
 

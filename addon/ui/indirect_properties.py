@@ -157,7 +157,7 @@ class DeepGBufferIndirectSettings(bpy.types.PropertyGroup):
         name="Exit Surfaces",
         description="Let rays know where objects end behind their visible side, so that they pass behind thin objects "
         "and stop at thick ones",
-        default=True,
+        default=False,
         update=changed,
     )
     cell_size: FloatProperty(

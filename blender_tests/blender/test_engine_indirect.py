@@ -25,7 +25,7 @@ SHARED = {
     "bounces": 7,
     "radius": 0.25,
     "march_distance": 12.5,
-    "exit_surfaces": False,
+    "exit_surfaces": True,
     "cell_size": 0.125,
     "spatial_filter": False,
     "temporal_filter": False,
@@ -207,12 +207,14 @@ def test_without_a_method_the_pass_is_black(plane_scene, tmp_path):
     assert not passes[name].any()
 
 
+@pytest.mark.parametrize("tilt", [0.0, 0.9])
 @pytest.mark.parametrize("method", ["OCCLUSION", "MARCH_GRID"])
-def test_an_open_plane_receives_the_worlds_light_by_the_pass(plane_scene, tmp_path, method):
+def test_an_open_plane_receives_the_worlds_light_by_the_pass(plane_scene, tmp_path, method, tilt):
     """Nothing hides the world: irradiance π L, radiance over albedo L; the rest of the picture is the sun's."""
     radiance = (0.5, 0.25, 1.0)
     plane_scene.deep_gbuffer.indirect.method = method
     world_light(plane_scene, radiance)
+    plane_scene.camera.rotation_euler.y = tilt
     names = ask_for_light(plane_scene)
     passes = render(plane_scene, tmp_path)
     direct, found, color = (passes[name][INSIDE] for name in names)

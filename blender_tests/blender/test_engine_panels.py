@@ -232,5 +232,6 @@ def test_statistics_show_times_passes_reasons_and_memory(plane_scene):
     texts = drawn(DEEP_GBUFFER_PT_statistics).texts
     assert {"Time", "Passes (last sample)", "Left out", "Memory", "gbuffer", "direct", "composite"} <= set(texts)
     assert any(text.endswith(" ms") for text in texts)
+    assert texts[texts.index("Ended by") + 1] == "Samples"
     assert any(text.endswith(" MiB") for text in texts)
     assert any("no" in text for text in texts[texts.index("Left out") : texts.index("Memory")])

@@ -18,6 +18,7 @@ BLOCK = UniformBlock("MarchUniforms", (("march_steps", "int"),))
 RAYS = ("ray_origins", "ray_directions", "ray_limits")
 RESULT = "march.result"
 FARTHEST = 1e30
+ROUNDING = 4.0 * 2.0**-23
 SOURCE = """
 #include "common/deep_march.glsl"
 #include "generated/MarchUniforms.glsl"
@@ -135,25 +136,37 @@ def _march_one(camera, depth, exits, origin, direction, reach, jitter, steps):
         pixel = np.clip(np.floor(at), 0, size - 1).astype(int)
         unsure |= bool((np.abs(at - np.round(at)) < 1e-3 * np.maximum(1.0, np.abs(last - first))).any())
         window = np.abs(high - low) / size
-        pixel_width = window.max() * (1.0 if camera.orthographic else ray_depth)
-        sheet = pixel_width * pixels * (2.0 * u + (1.0 - 2.0 * u) * even) / count
         begin = depth[:, pixel[1], pixel[0]].astype(float)
+        pixel_width = window.max() * (1.0 if camera.orthographic else begin)
+        sheet = pixel_width * pixels * (2.0 * u + (1.0 - 2.0 * u) * even) / count
         following = np.append(begin[1:], FARTHEST)
         ends = np.minimum(begin + sheet, following)
         if exits is not None:
             leaves = exits[:, pixel[1], pixel[0]].astype(float)
-            ends = np.where(leaves > following, ends, leaves)
+            ends = np.where(leaves > np.minimum(following, FARTHEST) * (1.0 + ROUNDING), ends, leaves)
+            backs = np.isfinite(begin[1:]) & (np.abs(leaves[:-1] - np.minimum(begin[1:], FARTHEST)) <= ROUNDING * begin[1:])
+            begin[1:], ends[1:] = np.where(backs, begin[:-1], begin[1:]), np.where(backs, -FARTHEST, ends[1:])
         rounding = 1e-5 * (np.abs(ray_depth) + np.abs(start[2]))
         margins = [ray_depth - begin, min(before, ray_depth) - ends]
         unsure |= any((np.abs(margin[np.isfinite(margin)]) < rounding).any() for margin in margins)
         for k in range(layers):
-            other = begin[min(k + 1, layers - 1)]
-            with np.errstate(invalid="ignore"):
-                same = abs(begin[k] - was[k]) < abs(other - was[k])
-            if begin[k] <= ray_depth and (min(before, ray_depth) <= ends[k] or (same and before < was[k])):
+            entered = min(before, ray_depth) <= ends[k] or _went_through(before, was, begin, k)
+            if begin[k] < ray_depth and entered:
                 return True, False, distance, k, pixel, unsure
         before, was = ray_depth, begin
     return False, screen < reach, end, 0, np.zeros(2, int), unsure or abs(screen - reach) < 1e-4 * end
+
+
+def _went_through(before, was, begin, k):
+    """Whether a ray was in front of what layer k shows now, in whichever layer that was."""
+    with np.errstate(invalid="ignore"):
+        apart = np.abs(begin[:, None] - was[None, :])  # from each layer now to each layer before
+    others = [j for j in (k - 1, k + 1) if 0 <= j < len(was)]
+    goes_on = k + 1 < len(was) and apart[k, k] < apart[k + 1, k] and before < was[k]
+    for j in others:
+        nearer_than = apart[j, j] if j < k else apart[k, k]
+        goes_on |= before < was[j] and apart[k, j] < nearer_than
+    return goes_on
 
 
 def _distance_on_screen(camera, start, way):
@@ -175,4 +188,4 @@ def _distance_at(camera, start, way, end, fraction):
     if camera.orthographic:
         return fraction * end
     last = start[2] + end * way[2]
-    return fraction * end * start[2] / (last + fraction * (start[2] - last))
+    return fraction * end * start[2] / ((1.0 - fraction) * last + fraction * start[2])

@@ -48,6 +48,8 @@ def random_layers(generator, layers, size, scale):
     depth = np.kron(np.sort(blocks, axis=0), np.ones((size // 4, size // 4))) * ramp
     exits = depth + generator.uniform(0.05, 2.0, depth.shape) * scale
     exits[generator.random(depth.shape) < 0.3] = INF
+    backs = generator.random(depth[1:].shape) < 0.3
+    exits[:-1][backs] = depth[1:][backs]
     return depth.astype(np.float32), exits.astype(np.float32)
 
 
@@ -183,7 +185,7 @@ def box_distances(origins, directions):
     nearest = np.full(len(origins), INF)
     for center, half in BOXES:
         with np.errstate(divide="ignore"):
-            one, other = ((center + side * half - origins) / directions for side in (-1.0, 1.0))
+            one, other = ((np.array(center) + side * half - origins) / directions for side in (-1.0, 1.0))
         enter, leave = np.minimum(one, other).max(axis=-1), np.maximum(one, other).min(axis=-1)
         nearest = np.where((enter <= leave) & (enter > 0.0) & (enter < nearest), enter, nearest)
     return nearest
@@ -248,8 +250,8 @@ def test_form_factors(shared_session, name):
         (rectangle("plate", center, half_x, half_y), glowing()),
         (rectangle("square", (0, 0, 0), (0.5, 0, 0), (0, 0.5, 0)), builders.material(base_color=(RHO,) * 3)),
     )
-    camera = looking((1.0, -2.6, 0.4), (0.0, 0.0, 0.35), half_width=0.36)
-    found, points, index = seen(shared_session, scene, camera, MARCH, samples=8, size=64)
+    camera = looking((0.3, -1.2, 0.4), (0.0, 0.0, 0.35), half_width=0.9)
+    found, points, index = seen(shared_session, scene, camera, replace(MARCH, march_steps=128), samples=8, size=96)
     shown = index == 2
     assert shown.sum() > 100
     corners = rectangle_corners(center, half_x, half_y)
@@ -312,5 +314,5 @@ def test_a_back_blocks_but_does_not_shine(shared_session):
     camera = looking((0.0, -2.5, 3.0), (0.0, 0.6, 0.4), half_width=0.6)
     found, points, index = seen(shared_session, scene, camera, MARCH, samples=2)
     shown = (index == 2) & (points[..., 1] > 0.1)
-    assert shown.sum() > 50
+    assert shown.sum() > 30
     assert found[shown].max() < 1.0

@@ -51,7 +51,7 @@ def test_layers_and_exit_surfaces_are_measured_together():
         for settings in (point.settings for point in sweep.points(quick=False))
     }
     for method in (None, "DEEP_MARCH"):
-        assert {(method, layers, exits) for layers in "124" for exits in (None, "False")} <= found
+        assert {(method, layers, exits) for layers in "124" for exits in (None, "True")} <= found
 
 
 def test_every_preset_file_is_measured():

@@ -4,6 +4,7 @@
 #include "common/deep_march.glsl"
 #include "common/hash.glsl"
 #include "common/noisy_irradiance.glsl"
+#include "common/layer_radiance.glsl"
 #include "common/octahedral.glsl"
 #include "generated/DeepMarchUniforms.glsl"
 #include "common/environment.glsl"
@@ -11,7 +12,6 @@
 
 uniform sampler2DArray normal_layers;
 #ifdef RADIANCE
-uniform sampler2DArray radiance_layers;
 #endif
 #ifdef BOUNCED
 uniform sampler2DArray base_color_layers;
@@ -31,10 +31,7 @@ layout(location = 1) out vec4 out_origin;
 /** Radiance, W/(sr·m²), that a texel of the layers sends. */
 vec3 sent_radiance(ivec3 texel)
 {
-    vec3 radiance = vec3(0.0);
-#ifdef RADIANCE
-    radiance += texelFetch(radiance_layers, texel, 0).rgb;
-#endif
+    vec3 radiance = shaded_radiance(texel);
 #ifdef BOUNCED
     float metallic = texelFetch(material_layers, texel, 0).r;
     vec3 albedo = min(texelFetch(base_color_layers, texel, 0).rgb, 1.0) * (1.0 - metallic);

@@ -5,6 +5,7 @@
 #include "common/camera.glsl"
 #include "common/finite.glsl"
 #include "common/hash.glsl"
+#include "common/layer_radiance.glsl"
 #include "common/octahedral.glsl"
 #include "generated/GatherUniforms.glsl"
 #include "common/environment.glsl"
@@ -19,9 +20,11 @@ uniform sampler2DArray view_depth_layers;
 uniform sampler2DArray normal_layers;
 uniform sampler2DArray base_color_layers;
 uniform sampler2DArray material_layers;
-uniform sampler2DArray radiance_layers;
 uniform sampler2D face_radiance;
 uniform sampler2D face_indirect;
+#ifdef SAMPLED_EMISSION
+uniform sampler2D face_emission;
+#endif
 
 layout(location = 0) out vec4 out_gathered; // irradiance, W/m², and the variance of its luminance
 #if defined(DEBUG_GRID_CELLS) || defined(DEBUG_GRID_RADIANCE) || defined(DEBUG_MARCH_HITS) || defined(DEBUG_LIGHT_ORIGIN)
@@ -84,7 +87,12 @@ vec3 layer_radiance(ivec3 texel, vec3 position, vec3 direction, int level)
     vec3 albedo = texelFetch(base_color_layers, texel, 0).rgb * (1.0 - metallic);
     int face = face_at(position, normal, level);
     vec3 indirect = face != NO_FACE ? texelFetch(face_indirect, face_texel(face), 0).rgb : vec3(0.0);
-    return texelFetch(radiance_layers, texel, 0).rgb + albedo / PI * indirect;
+    vec3 radiance = shaded_radiance(texel) + albedo / PI * indirect;
+#ifdef SAMPLED_EMISSION
+    // That of surfaces which are not among the lights.
+    radiance += face != NO_FACE ? texelFetch(face_emission, face_texel(face), 0).rgb : vec3(0.0);
+#endif
+    return radiance;
 }
 #endif
 

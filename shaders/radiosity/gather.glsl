@@ -4,6 +4,7 @@
 // BOUNCED: and irradiance that the bounce before found. Needs common/screen_taps.glsl.
 
 #include "common/luminance.glsl"
+#include "common/layer_radiance.glsl"
 #include "common/octahedral.glsl"
 #ifdef BOUNCED
 #include "common/bsdf.glsl"
@@ -16,7 +17,6 @@ uniform sampler2DArray material_layers;
 uniform sampler2DArray bounced_layers; // a texel for BOUNCE_DIVISOR² pixels
 #endif
 #ifdef RADIANCE
-uniform sampler2DArray radiance_layers;
 #endif
 
 // Exponent of the offset, pixels, up to which taps are not subsampled, less one.
@@ -54,10 +54,7 @@ vec3 bounced_radiance(ivec3 texel, vec3 normal)
 /** Radiance (W/(sr·m²)) that a layer with this normal sends in a pixel. */
 vec3 sent_radiance(ivec3 texel, vec3 normal)
 {
-    vec3 radiance = vec3(0.0);
-#ifdef RADIANCE
-    radiance += texelFetch(radiance_layers, texel, 0).rgb;
-#endif
+    vec3 radiance = shaded_radiance(texel);
 #ifdef BOUNCED
     radiance += bounced_radiance(texel, normal);
 #endif

@@ -42,7 +42,7 @@ class DeepMarchPass(FullscreenPass):
     @classmethod
     def variants(cls) -> Iterator[ProgramSpec]:
         """Everything there is for two layers; for other numbers of layers with and without exit surfaces."""
-        for defines in subsets(("EXIT", "RADIANCE", "BOUNCED", "WORLD", ENVIRONMENT_DEFINE)):
+        for defines in subsets(("EXIT", "RADIANCE", "SAMPLED_EMISSION", "BOUNCED", "WORLD", ENVIRONMENT_DEFINE)):
             if ENVIRONMENT_DEFINE not in defines or "WORLD" in defines:
                 yield _program(defines | {"LAYERS 2"})
         for shown in _ORIGIN_DEFINES:

@@ -29,7 +29,12 @@ CONTACT_REACH = 1.0
 """Cells that a ray goes through the layers before it goes on through the grid: what is nearer than that is not told
 apart by cells. Two cells made Sponza worse (FLIP .109 for .099): on the screen less is known."""
 
-_FACE_TEXTURES = {"face_planes": "planes", "face_radiance": "radiance", "face_indirect": "indirect"}
+_FACE_TEXTURES = {
+    "face_planes": "planes",
+    "face_radiance": "radiance",
+    "face_indirect": "indirect",
+    "face_emission": "emission",
+}
 _SAMPLERS = ("grid_cells", *_FACE_TEXTURES, *ENVIRONMENT_SAMPLERS)
 _SHOWN = ("DEBUG_GRID_CELLS", "DEBUG_GRID_RADIANCE", "DEBUG_MARCH_HITS", "DEBUG_LIGHT_ORIGIN")
 
@@ -44,7 +49,7 @@ class GatherPass(FullscreenPass):
     def variants(cls) -> Iterator[ProgramSpec]:
         """Every number of layers that differs in code, with and without exit surfaces, world and debug views."""
         for layers in (1, 2, 8):
-            for defines in subsets(("CONTACT", "EXIT", "WORLD", "ENVIRONMENT")):
+            for defines in subsets(("CONTACT", "EXIT", "RADIANCE", "SAMPLED_EMISSION", "WORLD", "ENVIRONMENT")):
                 if ENVIRONMENT_DEFINE not in defines or "WORLD" in defines:
                     yield _program(defines | {f"LAYERS {layers}"})
         for shown in _SHOWN:

@@ -44,6 +44,7 @@ class RadiosityPass(FullscreenPass):
         sent = [
             set[str](),
             {"RADIANCE"},
+            {"RADIANCE", "SAMPLED_EMISSION"},
             *({"RADIANCE", "BOUNCED"} | material for material in subsets(MATERIAL_DEFINES)),
         ]
         composites = [set[str](), {"PAPER"}, {"PAPER", "WORLD"}, {"PAPER", "WORLD", ENVIRONMENT_DEFINE}]
