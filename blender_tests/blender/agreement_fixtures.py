@@ -15,6 +15,7 @@ SMALLEST_FILTER = 0.01
 PASS_NAMES = {
     "DiffCol": "Diffuse Color",
     "DiffDir": "Diffuse Direct",
+    "DiffInd": "Diffuse Indirect",
     "GlossCol": "Glossy Color",
     "GlossDir": "Glossy Direct",
     "Emit": "Emission",

@@ -34,18 +34,19 @@ void main()
     vec3 origin = texelFetch(ray_origins, texel, 0).xyz, direction = texelFetch(ray_directions, texel, 0).xyz;
     MarchHit hit = deep_march(origin, direction, limits.x, march_steps, limits.y);
     met = vec4(float(hit.hit), float(hit.ended), hit.distance, float(hit.layer));
-    where_met = vec4(hit.pixel, 0, 0);
+    where_met = vec4(hit.pixel, float(hit.hidden), 0.0);
 }
 """
 
 
 @dataclass(frozen=True)
 class Met:
-    """What N rays met: `hit`, `ended` (N,) bool, `distance` (N,) m, `layer` (N,) int, `pixel` (N, 2) int; `unsure` (N,)
-    where rounding to float32 may have it otherwise."""
+    """What N rays met: `hit`, `ended`, `hidden` (N,) bool, `distance` (N,) m, `layer` (N,) int, `pixel` (N, 2) int;
+    `unsure` (N,) where rounding to float32 may have it otherwise."""
 
     hit: np.ndarray
     ended: np.ndarray
+    hidden: np.ndarray
     distance: np.ndarray
     layer: np.ndarray
     pixel: np.ndarray
@@ -65,9 +66,7 @@ def _march(device, camera, depth, exits, origins, directions, reach, steps, jitt
     results = [TargetSpec(f"{RESULT}{index}", 4, "f4") for index in range(2)]
     rays = [TargetSpec(name, 4, "f4") for name in RAYS]
     defines = frozenset({f"LAYERS {layers}"} | ({"EXIT"} if exits is not None else set()))
-    spec = fullscreen_program(
-        "generated/march.glsl", BLOCK, defines, samplers=RAYS, generated=(("march", SOURCE),)
-    )
+    spec = fullscreen_program("generated/march.glsl", BLOCK, defines, samplers=RAYS, generated=(("march", SOURCE),))
     pool, draw = TexturePool(device), FullscreenDraw(device, BLOCK)
     try:
         pool.prepare((width, height), (*targets, *rays, *results))
@@ -90,6 +89,7 @@ def _march(device, camera, depth, exits, origins, directions, reach, steps, jitt
         return Met(
             found[:, 0] > 0.5,
             found[:, 1] > 0.5,
+            places[:, 2] > 0.5,
             found[:, 2].astype(np.float64),
             found[:, 3].astype(int),
             places[:, :2].astype(int),
@@ -127,6 +127,7 @@ def _march_one(camera, depth, exits, origin, direction, reach, jitter, steps):
     count = float(np.clip(np.ceil(pixels), 1.0, steps))
     even = min(count / max(pixels, 1.0), 1.0)
     before, was = start[2], np.full(layers, -FARTHEST)
+    was[0] = start[2] + ROUNDING * abs(start[2])
     unsure = abs(pixels - round(pixels)) < 1e-3 * max(pixels, 1.0) and pixels < steps + 1
     for taken in np.arange(1.0, count + 1.0):
         u = (taken - jitter) / (count - jitter)
@@ -144,7 +145,9 @@ def _march_one(camera, depth, exits, origin, direction, reach, jitter, steps):
         if exits is not None:
             leaves = exits[:, pixel[1], pixel[0]].astype(float)
             ends = np.where(leaves > np.minimum(following, FARTHEST) * (1.0 + ROUNDING), ends, leaves)
-            backs = np.isfinite(begin[1:]) & (np.abs(leaves[:-1] - np.minimum(begin[1:], FARTHEST)) <= ROUNDING * begin[1:])
+            backs = np.isfinite(begin[1:]) & (
+                np.abs(leaves[:-1] - np.minimum(begin[1:], FARTHEST)) <= ROUNDING * begin[1:]
+            )
             begin[1:], ends[1:] = np.where(backs, begin[:-1], begin[1:]), np.where(backs, -FARTHEST, ends[1:])
         rounding = 1e-5 * (np.abs(ray_depth) + np.abs(start[2]))
         margins = [ray_depth - begin, min(before, ray_depth) - ends]
@@ -152,9 +155,10 @@ def _march_one(camera, depth, exits, origin, direction, reach, jitter, steps):
         for k in range(layers):
             entered = min(before, ray_depth) <= ends[k] or _went_through(before, was, begin, k)
             if begin[k] < ray_depth and entered:
-                return True, False, distance, k, pixel, unsure
+                return True, False, False, distance, k, pixel, unsure
+        hidden = begin[0] < ray_depth
         before, was = ray_depth, begin
-    return False, screen < reach, end, 0, np.zeros(2, int), unsure or abs(screen - reach) < 1e-4 * end
+    return False, screen < reach, hidden, end, 0, np.zeros(2, int), unsure or abs(screen - reach) < 1e-4 * end
 
 
 def _went_through(before, was, begin, k):

@@ -134,9 +134,10 @@ def on_the_receiver(session, scene, camera, indirect, **settings):
 
 
 @pytest.mark.parametrize("name", PLATES)
-@pytest.mark.parametrize("filtered", [False, True], ids=["as gathered", "filtered"])
-def test_form_factors(shared_session, name, filtered):
-    """Lambert's polygon, whose mean over the square is the form factor, within 3 %."""
+@pytest.mark.parametrize(("filtered", "limit"), [(False, 0.03), (True, 0.05)], ids=["as gathered", "filtered"])
+def test_form_factors(shared_session, name, filtered, limit):
+    """Lambert's polygon, whose mean over the square is the form factor, within 3 %; where pixels share what they gather
+    and smooth it, a few more are lost at the square's edges."""
     center, half_x, half_y = PLATES[name]
     scene = of(
         (rectangle("plate", center, half_x, half_y), glowing()),
@@ -146,7 +147,7 @@ def test_form_factors(shared_session, name, filtered):
     indirect = replace(GRID if filtered else UNFILTERED, bounces=1)
     found, points, area = on_the_receiver(shared_session, scene, camera, indirect, samples=32)
     expected = plate_irradiance(points, center, half_x, half_y)
-    assert (area @ found) / (area @ expected) == pytest.approx(1.0, abs=0.03)
+    assert (area @ found) / (area @ expected) == pytest.approx(1.0, abs=limit)
     for quarter in np.arange(-0.5, 0.5, 0.25):
         there = (points[:, 0] >= quarter) & (points[:, 0] < quarter + 0.25)
         assert found[there].sum() == pytest.approx(expected[there].sum(), rel=0.1), "the light must be where it belongs"

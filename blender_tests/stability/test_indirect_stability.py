@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Indirect light from frame to frame, as a viewport shows it: one sample each, the picture before known."""
+"""Indirect light from frame to frame, as a viewport shows it: a few samples each, the picture before known."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -29,7 +29,7 @@ def session() -> Iterator[Session]:
 
 
 def frame(
-    session: Session, moment: Moment, before: Moment | None, seed: int, samples: int = 1, **numbers: object
+    session: Session, moment: Moment, before: Moment | None, seed: int = 0, samples: int = 8, **numbers: object
 ) -> tuple[np.ndarray, ...]:
     """The next picture of a viewport: (indirect radiance, positions, object indices); see `seen`."""
     sequence = Frames(previous=before, continuous=True)
@@ -40,9 +40,9 @@ def frame(
 
 
 def played(session: Session, moments: Sequence[Moment], **numbers: object) -> list[tuple[np.ndarray, ...]]:
-    """All pictures of a clip; each has random numbers of its own."""
+    """All pictures of a clip."""
     before: list[Moment | None] = [None, *moments]
-    return [frame(session, moment, before[at], at, **numbers) for at, moment in enumerate(moments)]
+    return [frame(session, moment, before[at], **numbers) for at, moment in enumerate(moments)]
 
 
 def patches(picture: tuple[np.ndarray, ...], thing: int, cells: int = 3, half: float = 0.6) -> np.ndarray:
@@ -107,7 +107,7 @@ def test_a_cut_leaves_no_trace_after_a_frame(session: Session, method: IndirectM
         moments = [*first, here, here]
         before: list[Moment | None] = [None, *moments]
         for at, moment in enumerate(moments):
-            picture = frame(viewport, moment, before[at], seed + at + 2 - len(first), samples=4, method=method)
+            picture = frame(viewport, moment, before[at], seed, samples=4, method=method)
         viewport.release()
         return picture[0]
 
@@ -128,13 +128,13 @@ def steps(series: np.ndarray) -> np.ndarray:
     return np.diff(series) / series.mean()
 
 
-@pytest.mark.parametrize("cell_size", [0.0, 0.06])
+@pytest.mark.parametrize("cell_size", [0.0, 0.1])
 def test_a_slow_pan_does_not_pop(session: Session, cell_size: float) -> None:
     """A camera goes through the room, nearer and sideways, while cells that suit the view get smaller, and the grid's
-    levels, which do not cover what there is 40 m away, move along: from frame to frame the light of a place changes by
+    levels, which do not cover what there is 12 m away, move along: from frame to frame the light of a place changes by
     no more than a few standard deviations of what it does where nothing moves farther than a pixel, and by no more
     than a few percent in all."""
-    specks = [rectangle(f"speck {x}", (x, x, x), (0.01, 0, 0), (0, 0.01, 0)) for x in (-40.0, 40.0)]
+    specks = [rectangle(f"speck {x}", (x, x, x), (0.01, 0, 0), (0, 0.01, 0)) for x in (-12.0, 12.0)]
     scene = beside(cornell(), *((speck, builders.DIFFUSE) for speck in specks))
     generator = np.random.default_rng(3)
 
@@ -142,13 +142,13 @@ def test_a_slow_pan_does_not_pop(session: Session, cell_size: float) -> None:
         return Moment(scene, looking((x, -2.2 + nearer, 0.0), (x, 0.0, 0.0), half_width=0.6))
 
     numbers = {"cell_size": cell_size, "bounces": None, "temporal_filter": False}
-    moving = [at(0.3 * share, 0.8 * share) for share in np.linspace(0.0, 1.0, 16)]
-    resting = [at(*generator.uniform(-0.04, 0.04, 2)) for _ in range(16)]
+    moving = [at(0.3 * share, 0.8 * share) for share in np.linspace(0.0, 1.0, 12)]
+    resting = [at(*generator.uniform(-0.04, 0.04, 2)) for _ in range(12)]
     viewport = Session()
     rest, pan = (wall_light(played(one, clip, **numbers)) for one, clip in ((viewport, resting), (session, moving)))
     viewport.release()
     assert np.isfinite(pan).all()
-    assert np.abs(steps(pan)).max() <= 4.0 * steps(rest).std() + 0.02
+    assert np.abs(steps(pan)).max() <= 4.0 * steps(rest).std() + 0.01
     assert abs(pan[-4:].mean() / pan[:4].mean() - 1.0) < 0.05
 
 
@@ -167,9 +167,9 @@ def lit(x: float, strength: float = 1.0) -> Moment:
     return Moment(replace(ROOM, lights=(lamp_at(x, strength),)), camera)
 
 
-def light_of(viewport: Session, moments: Sequence[Moment]) -> np.ndarray:
-    """(frames, patches) of the back wall."""
-    return np.array([patches(picture, BACK) for picture in played(viewport, moments, bounces=2)])
+def light_of(viewport: Session, moments: Sequence[Moment], **numbers: object) -> np.ndarray:
+    """(frames, patches) of the back wall; pictures of equal number have equal random numbers."""
+    return np.array([patches(picture, BACK) for picture in played(viewport, moments, bounces=2, **numbers)])
 
 
 def test_light_follows_a_lamp_that_moves(session: Session) -> None:
@@ -196,7 +196,7 @@ def test_light_that_goes_out_is_gone(session: Session) -> None:
 
 
 def test_a_moving_object_takes_its_light_along(session: Session) -> None:
-    """A panel that shines moves across the room: where it was, it no longer shines."""
+    """A panel that shines moves across the room: where it was, nothing of it is left in the grid."""
     camera = looking((0.0, -3.6, 0.0), (0.0, 0.0, 0.0), half_width=0.38)
     room = cornell()
 
@@ -205,9 +205,11 @@ def test_a_moving_object_takes_its_light_along(session: Session) -> None:
         batches[-1] = replace(batches[-1], matrices=builders.translation(x=x)[None], version=new_version())
         return replace(room, batches=tuple(batches))
 
-    places = [-0.5, -0.25, 0.0, 0.25, 0.5, 0.5, 0.5, 0.5]
-    followed = light_of(session, [Moment(moved(x), camera) for x in places])
+    still = Moment(moved(0.5), camera)
+    clip = [*(Moment(moved(x), camera) for x in (-0.5, -0.25, 0.0, 0.25)), *[still] * 4]
+    followed = light_of(session, clip, temporal_filter=False)
     viewport = Session()
-    rested = light_of(viewport, [Moment(moved(0.5), camera)] * 6)
+    rested = light_of(viewport, [still] * 8, temporal_filter=False)
     viewport.release()
-    np.testing.assert_allclose(np.nanmean(followed[-2:], axis=0), np.nanmean(rested[3:], axis=0), rtol=0.1)
+    np.testing.assert_allclose(followed[4:], rested[4:], rtol=1e-3)
+    assert np.nanmax(np.abs(followed[:3] / rested[:3] - 1.0)) > 0.1, "the panel must have changed something"

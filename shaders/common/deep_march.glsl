@@ -12,12 +12,14 @@ uniform sampler2DArray exit_view_depth_layers;
 
 /**
  * What a ray met. `hit`: a layer; `layer` and `pixel` (of the whole guarded picture) of what it met, and `distance` (m)
- * to it. Otherwise `distance` is how far nothing was met, and `ended`: whether that is because the screen ends.
+ * to it. Otherwise `distance` is how far nothing was met; `ended`: whether that is because the screen ends; `hidden`:
+ * whether it is behind the nearest layer there, where something unseen may be in its way.
  */
 struct MarchHit
 {
     bool hit;
     bool ended;
+    bool hidden;
     float distance;
     int layer;
     ivec2 pixel;
@@ -45,7 +47,8 @@ float distance_on_screen(vec3 start, vec3 way)
     vec4 side = vec4(1.0, -1.0, 1.0, -1.0);
     vec4 inside = side * (start.xxyy - camera_window * begin);
     vec4 approach = side * (camera_window * widening - way.xxyy);
-    vec4 distances = mix(vec4(FARTHEST), max(inside, 0.0) / max(approach, 1.0 / FARTHEST), greaterThan(approach, vec4(0.0)));
+    vec4 distances = max(inside, 0.0) / max(approach, 1.0 / FARTHEST);
+    distances = mix(vec4(FARTHEST), distances, greaterThan(approach, vec4(0.0)));
     float edge = min(min(distances.x, distances.y), min(distances.z, distances.w));
     // The edges meet in the eye: before it, where half the digits of the depth are left.
     bool comes_near = camera_orthographic == 0 && way.z < 0.0;
@@ -86,8 +89,8 @@ MarchedRay marched_ray(vec3 start, vec3 way, float end)
 
 /**
  * Between which view depths (m) each layer at a pixel is solid: to its exit surface, where no other layer comes before
- * that. What has no back, or without EXIT anything, is a sheet: as thick as so many pixels are wide, at most. A layer that
- * shows the back of the one before, which is no surface to enter by, begins where that one does and ends at once.
+ * that. What has no back, or without EXIT anything, is a sheet: as thick as so many pixels are wide, at most. A layer
+ * that shows the back of the one before, which is no surface to enter by, begins where that one does and ends at once.
  */
 void layer_slabs(ivec2 pixel, float pixels, out float begin[LAYERS], out float end[LAYERS])
 {
@@ -129,8 +132,8 @@ bool went_through(float before, float was[LAYERS], float is[LAYERS], int k)
  * The first of the layers that a ray enters.
  *
  * `origin`: relative position (m), off the surface as `march_origin` says; `direction`: unit vector, world axes;
- * `reach` (m): how far to look; `steps` ≥ 1: how often at most, each time at least a pixel farther and nearer the origin
- * more densely; `jitter` in [0, 1) moves them, but the last is always at the end of the way.
+ * `reach` (m): how far to look; `steps` ≥ 1: how often at most, each time at least a pixel farther, more densely near
+ * the origin; `jitter` in [0, 1) moves them, but the last is always at the end of the way.
  *
  * A ray enters a layer where it is behind its surface at a step, if it was not behind all of the slab at the step
  * before; or if it was in front of that surface then, see `went_through`.
@@ -142,7 +145,7 @@ MarchHit deep_march(vec3 origin, vec3 direction, float reach, int steps, float j
     float screen = distance_on_screen(start, way);
     float farthest = min(reach, screen);
     MarchedRay ray = marched_ray(start, way, farthest);
-    MarchHit hit = MarchHit(false, screen < reach, farthest, 0, ivec2(0));
+    MarchHit hit = MarchHit(false, screen < reach, false, farthest, 0, ivec2(0));
 
     float pixels = max(abs(ray.way.x), abs(ray.way.y));
     float count = clamp(ceil(pixels), 1.0, float(steps));
@@ -150,9 +153,10 @@ MarchHit deep_march(vec3 origin, vec3 direction, float reach, int steps, float j
     float even = min(count / max(pixels, 1.0), 1.0);
     ivec2 last_pixel = ivec2(camera_resolution) - 1;
     float before = start.z;
+    // Where it starts, all that is known is the surface that it starts from.
     float was[LAYERS];
     for (int k = 0; k < LAYERS; ++k)
-        was[k] = -FARTHEST;
+        was[k] = k == 0 ? start.z + 4.0 * FLOAT_EPSILON * abs(start.z) : -FARTHEST;
     for (float taken = 1.0; taken <= count && !hit.hit; taken += 1.0) {
         float u = (taken - jitter) / (count - jitter);
         float s = u * mix(u, 1.0, even);
@@ -166,8 +170,9 @@ MarchHit deep_march(vec3 origin, vec3 direction, float reach, int steps, float j
         for (int k = 0; k < LAYERS; ++k) {
             bool entered = min(before, depth) <= end[k] || went_through(before, was, begin, k);
             if (!hit.hit && begin[k] < depth && entered)
-                hit = MarchHit(true, false, s * ray.distance * scale, k, pixel);
+                hit = MarchHit(true, false, false, s * ray.distance * scale, k, pixel);
         }
+        hit.hidden = !hit.hit && begin[0] < depth;
         before = depth;
         was = begin;
     }

@@ -57,10 +57,11 @@ struct GridHit
 /**
  * The first face that a ray meets from its front, after Amanatides and Woo 1987, "A Fast Voxel Traversal Algorithm".
  *
- * `start` (m): nothing nearer is met. It goes through each level from `first_level` on for `grid_reach` cells at most,
+ * `start` (m): nothing nearer is met. `random`, in 0…1, another for each ray: surfaces that fill a part of their box are
+ * met by as many rays. It goes through each level from `first_level` on for `grid_reach` cells at most,
  * then through the next coarser one.
  */
-GridHit trace_grid(vec3 origin, vec3 direction, int first_level, float start)
+GridHit trace_grid(vec3 origin, vec3 direction, int first_level, float start, float random)
 {
     const float FAR = 1e30;
     uint facing = facing_orientations(direction);
@@ -98,7 +99,7 @@ GridHit trace_grid(vec3 origin, vec3 direction, int first_level, float start)
                 float meets = (plane.distance - dot(plane.normal, from)) / min(approach, -1e-6);
                 vec3 point = from + meets * direction;
                 bool inside = all(greaterThanEqual(point, plane.low)) && all(lessThanEqual(point, plane.high));
-                if (inside && approach < 0.0 && meets >= enter && meets * cell_size < hit.distance)
+                if (inside && approach < 0.0 && plane.coverage > random && meets >= enter && meets * cell_size < hit.distance)
                     hit = GridHit(face, meets * cell_size);
             }
             bvec3 nearest = lessThanEqual(next, vec3(t_next));

@@ -40,7 +40,7 @@ vec3 sent_radiance(ivec3 texel)
     return radiance;
 }
 
-/** Radiance that arrives along a ray from a layer that it met, or from the world. */
+/** Radiance that arrives along a ray from a layer that it met, or from the world, but none from where nobody sees. */
 vec3 arriving_radiance(MarchHit hit, vec3 direction)
 {
     if (hit.hit) {
@@ -49,7 +49,7 @@ vec3 arriving_radiance(MarchHit hit, vec3 direction)
         return dot(normal, direction) < 0.0 ? sent_radiance(texel) : vec3(0.0);
     }
 #ifdef WORLD
-    return environment_radiance(direction);
+    return hit.hidden ? vec3(0.0) : environment_radiance(direction);
 #else
     return vec3(0.0);
 #endif

@@ -115,12 +115,12 @@ void main()
     float sum_of_squares = 0.0, marched = 0.0;
     for (int ray = 0; ray < gather_rays; ++ray) {
         vec3 direction = cosine_direction(normal, ray_random(texel, ray, gather_rays));
+        // Not what chose the direction, or where a ray looks would decide where it steps and what it meets.
+        float jitter = fract(hash_to_unit(uvec2(texel)).x + gather_shift.x + float(ray) * 0.6180339887498949);
         vec3 radiance = vec3(0.0);
         float start = 0.0;
         bool met = false;
 #ifdef CONTACT
-        // Not what chose the ray's direction, or where it looks would decide where it steps.
-        float jitter = fract(hash_to_unit(uvec2(texel)).x + gather_shift.x + float(ray) * 0.6180339887498949);
         float reach = CONTACT_REACH * grid_cell_size(level);
         vec3 origin = march_origin(position, normal, view_depth);
         MarchHit near = deep_march(origin, direction, reach, contact_steps, jitter);
@@ -130,10 +130,10 @@ void main()
             marched += 1.0;
             origins.r += 1.0;
         }
-        start = near.distance;
+        start = 0.0;
 #endif
         if (!met) {
-            GridHit far = trace_grid(position + offset * normal, direction, level, start);
+            GridHit far = trace_grid(position + offset * normal, direction, level, start, jitter);
             if (far.face != NO_FACE) {
                 radiance = texelFetch(face_radiance, face_texel(far.face), 0).rgb;
                 origins.g += 1.0;

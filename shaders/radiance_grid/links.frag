@@ -11,7 +11,9 @@ void main()
     if (face < first_face || face >= end_face)
         discard;
     Face from = fetch_face(face);
-    vec3 direction = ray_direction(from, texelFetch(face_places, face_texel(face), 0).rg, ray);
+    uvec2 place = texelFetch(face_places, face_texel(face), 0).rg;
+    vec3 direction = ray_direction(from, place, ray);
+    float random = hash_to_unit(place + uint(ray) * uvec2(2654435761u, 40503u)).x;
     vec3 origin = from.position + START_OFFSET * from.cell * from.normal;
-    out_link = uint(trace_grid(origin, direction, from.level, 0.0).face + 1);
+    out_link = uint(trace_grid(origin, direction, from.level, 0.0, random).face + 1);
 }

@@ -21,17 +21,37 @@ layout(location = 3) out vec4 out_emission;
 
 // Where surfaces go on in the next cell, rays may miss them by this part of a cell, or they would slip through between two
 // planes that were fitted to a curved one.
-const float PLANE_TOLERANCE = 0.1;
+const float PLANE_TOLERANCE = 0.2;
 
-/**
- * How far a surface reaches towards a cell's sides, whose outermost points are at `extent` (0…½) from its centre.
- *
- * Half the points' spacing farther, on average; nearer to a side than all of it, it goes on in the next cell as far as
- * points can tell.
- */
+/** How far a surface whose points reach to `extent` (0…½) from a cell's centre does: those that reach its side go on. */
 vec3 reach(vec3 extent)
 {
-    return mix(extent + 0.5 * POINT_SPACING, vec3(0.5 + PLANE_TOLERANCE), greaterThan(extent, vec3(0.5 - POINT_SPACING)));
+    return mix(extent, vec3(0.5 + PLANE_TOLERANCE), greaterThan(extent, vec3(0.49)));
+}
+
+// Points tell the area in a cell no better than to about this part: closed surfaces must stay closed.
+const float AREA_PRECISION = 0.5;
+
+/**
+ * Area (squares of a cell's side) of the part of a plane (unit normal, distance from the cell's centre) inside a box:
+ * from lines through it along the axis that the normal is nearest to.
+ */
+float area_in_box(vec3 normal, float distance, vec3 low, vec3 high)
+{
+    const int LINES = 8; // each way
+    vec3 size = abs(normal);
+    int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    int inside = 0;
+    for (int line = 0; line < LINES * LINES; ++line) {
+        vec2 place = (vec2(line % LINES, line / LINES) + 0.5) / float(LINES);
+        vec3 point = vec3(0.0);
+        point[u] = mix(low[u], high[u], place.x);
+        point[v] = mix(low[v], high[v], place.y);
+        float height = (distance - dot(normal, point)) / normal[axis];
+        inside += height >= low[axis] && height <= high[axis] ? 1 : 0;
+    }
+    return float(inside) / float(LINES * LINES) * (high[u] - low[u]) * (high[v] - low[v]) / size[axis];
 }
 
 void main()
@@ -53,7 +73,11 @@ void main()
     vec3 offset = (offsets.xyz + other_offsets.xyz) / area;
     vec3 high = max(texelFetch(most, own, 0).xyz, texelFetch(most, other, 0).xyz) - 0.5;
     vec3 low = max(texelFetch(least, own, 0).xyz, texelFetch(least, other, 0).xyz) - 0.5;
-    out_plane = encode_plane(Plane(normal, dot(normal, offset), -reach(low), reach(high)));
+    vec3 low_end = -reach(low), high_end = reach(high);
+    float distance = dot(normal, offset), level_cell = grid_origins[texelFetch(face_places, own, 0).g >> 3u].w;
+    float within = area_in_box(normal, distance, max(low_end, -0.5), min(high_end, vec3(0.5))) * level_cell * level_cell;
+    float coverage = base_color.a >= (1.0 - AREA_PRECISION) * within ? 1.0 : base_color.a / within;
+    out_plane = encode_plane(Plane(normal, distance, low_end, high_end, coverage));
     out_point = vec4(offset, base_color.a);
     out_albedo = vec4(base_color.rgb / area, 1.0);
     out_emission = vec4((emissions.rgb + vec3(other_offsets.a, other_normals.a, other_emissions.a)) / area, 0.0);

@@ -12,6 +12,10 @@ uniform sampler2D base_color_texture;
 flat in vec3 offset;
 flat in vec3 normal;
 flat in float area;
+#ifndef OCCUPANCY
+flat in vec3 low;
+flat in vec3 high;
+#endif
 #ifdef TEXTURE
 flat in vec2 uv;
 flat in float uv_scale;
@@ -62,7 +66,7 @@ void main()
     sum_offset = vec4(offset, back.r) * area;
     sum_normal = vec4(normal, back.g) * area;
     sum_emission = vec4(front, back.b) * area;
-    most = vec4(0.5 + offset, 0.0);
-    least = vec4(0.5 - offset, 0.0);
+    most = vec4(0.5 + min(high, 0.5), 0.0);
+    least = vec4(0.5 - max(low, -0.5), 0.0);
 #endif
 }

@@ -8,6 +8,10 @@
 
 in vec3 in_position;
 in vec3 in_normal;  // unit, of the triangle
+#ifndef OCCUPANCY
+in vec4 in_reach_low;   // how far the surface goes on from the point, each way along the object's axes,
+in vec4 in_reach_high;  // of REACH times point_spacing
+#endif
 #ifdef TEXTURE
 in vec2 in_uv;
 in float in_uv_scale;
@@ -22,6 +26,10 @@ in vec2 in_glow;    // whether the front and the back of the instance send the l
 flat out vec3 offset;       // from the cell's centre, cells
 flat out vec3 normal;       // unit, world space
 flat out float area;        // m²
+#ifndef OCCUPANCY
+flat out vec3 low;          // box around the point's surface, from the cell's centre, cells
+flat out vec3 high;
+#endif
 #ifdef TEXTURE
 flat out vec2 uv;
 flat out float uv_scale;
@@ -55,6 +63,13 @@ void main()
     area = point_area * scale;
     cell = clamp(cell, ivec3(0), size - 1);
     int orientation = orientation_of(normal);
+#ifndef OCCUPANCY
+    for (int axis = 0; axis < 3; ++axis) {
+        vec3 row = (axis == 0 ? in_row_0 : axis == 1 ? in_row_1 : in_row_2).xyz * (REACH * point_spacing / level_cell);
+        low[axis] = offset[axis] - dot(max(row, 0.0), in_reach_low.xyz) + dot(min(row, 0.0), in_reach_high.xyz);
+        high[axis] = offset[axis] + dot(max(row, 0.0), in_reach_high.xyz) - dot(min(row, 0.0), in_reach_low.xyz);
+    }
+#endif
 #ifdef OCCUPANCY
     int index = 6 * (cell.x + size.x * (cell.y + size.y * cell.z)) + orientation;
 #else

@@ -26,7 +26,7 @@ from ..programs import ProgramSpec
 from ..uniforms import UniformBlock
 from .faces import ORIENTATIONS, number_faces
 from .levels import GridLevel
-from .points import POINTS_PER_CELL, SurfacePoints, surface_points
+from .points import POINTS_PER_CELL, REACH, SurfacePoints, surface_points
 from .textures import (
     ADDED_UP,
     FACE_UNIFORMS,
@@ -52,9 +52,6 @@ GRID_POINTS_UNIFORMS = UniformBlock(
     ),
 )
 
-
-_PLANE_DEFINES = frozenset({f"POINT_SPACING {1.0 / sqrt(POINTS_PER_CELL)}"})
-"""Cells between points, about."""
 
 _OCCUPANCY_WIDTH = 4096
 _POINTS_BINDING, _MATERIAL_BINDING = 0, 1
@@ -215,6 +212,8 @@ class GridFill:
             (points.uvs, "2f", "in_uv"),
             (points.uv_scale, "1f", "in_uv_scale"),
             (points.colors, "4f", "in_color"),
+            (points.reaches[:, 0], "4f1", "in_reach_low"),
+            (points.reaches[:, 1], "4f1", "in_reach_high"),
         )
         if points.count == 0:
             return _PointBuffers(points, [])
@@ -228,7 +227,7 @@ class GridFill:
 
     def _find_planes(self, textures: GridTextures) -> None:
         sums = (*ADDED_UP, *GREATEST)
-        spec = self._planes.spec("radiance_grid/planes.frag", _PLANE_DEFINES, (*sums, "face_places"))
+        spec = self._planes.spec("radiance_grid/planes.frag", samplers=(*sums, "face_places"))
         textures.places.use(len(sums))
         for unit, name in enumerate(sums):
             textures.texture(name).use(unit)
@@ -242,7 +241,7 @@ def points_program(defines: frozenset[str]) -> ProgramSpec:
     return ProgramSpec(
         vertex="radiance_grid/points.vert",
         fragment="radiance_grid/points.frag",
-        defines=defines | GRID_DEFINES | {f"LARGEST_REFLECTANCE {LARGEST_REFLECTANCE}"},
+        defines=defines | GRID_DEFINES | {f"LARGEST_REFLECTANCE {LARGEST_REFLECTANCE}", f"REACH {REACH}"},
         blocks=(GRID_POINTS_UNIFORMS, MATERIAL_UNIFORMS),
         samplers=("grid_cells", "base_color_texture"),
     )
@@ -250,7 +249,7 @@ def points_program(defines: frozenset[str]) -> ProgramSpec:
 
 def fill_variants() -> Iterator[ProgramSpec]:
     """Every program that fills the grid."""
-    yield face_program("radiance_grid/planes.frag", (FACE_UNIFORMS,), _PLANE_DEFINES, ())
+    yield face_program("radiance_grid/planes.frag", (FACE_UNIFORMS,), frozenset(), ())
     for surface, purpose in product(SURFACES, ((), ("OCCUPANCY",), ("EMISSION",))):
         yield points_program(surface | frozenset(purpose))
 

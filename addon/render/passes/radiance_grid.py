@@ -26,6 +26,9 @@ from .base import Frame
 _SAME_CELLS = 1.5
 """A viewport keeps its cells until they are so many times larger or smaller than they should be."""
 
+_CLOSEST = 4.0
+"""A camera that comes near something typical of the scene gets cells so many times finer than when it sees all of it."""
+
 _SEEN_SHARE = 0.8
 """Share of the picture whose depth decides how fine the cells are: what is farther may be any distance away."""
 
@@ -115,10 +118,12 @@ class _Seen:
 
 def _look(frame: Frame, before: float | None) -> _Seen:
     """What a view's grid is fitted to. `before` (m): cells of the view before it in a viewport."""
-    bounds, indirect = scene_bounds(frame.scene), frame.settings.indirect
+    boxes, indirect = scene_boxes(frame.scene), frame.settings.indirect
+    bounds = np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
     seen = _seen_box(frame)
     seen = bounds if seen is None else seen
-    cell = indirect.cell_size or cell_size(seen, indirect.cells)
+    typical = float(np.median((boxes[:, 1] - boxes[:, 0]).max(axis=1)))
+    cell = indirect.cell_size or max(cell_size(seen, indirect.cells), typical / (_CLOSEST * indirect.cells))
     if before is not None and not indirect.cell_size and 1.0 / _SAME_CELLS <= before / cell <= _SAME_CELLS:
         cell = before
     return _Seen(bounds, seen.mean(axis=0), cell)
@@ -140,12 +145,10 @@ def _seen_box(frame: Frame) -> Float64Array | None:
     return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
 
-def scene_bounds(scene: Scene) -> Float64Array:
-    """(2, 3) lowest and highest corner of everything, world space."""
+def scene_boxes(scene: Scene) -> Float64Array:
+    """(N, 2, 3) lowest and highest corner of all instances of each batch, world space; at least one box."""
     boxes = [batch_bounds(scene.meshes[batch.mesh], batch) for batch in scene.batches if batch.count]
-    if not boxes:
-        return np.zeros((2, 3))
-    return np.stack([np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)])
+    return np.array(boxes or [np.zeros((2, 3))])
 
 
 def _contents(frame: Frame, levels: tuple[GridLevel, ...]) -> Hashable:
