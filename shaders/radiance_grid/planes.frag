@@ -54,6 +54,16 @@ float area_in_box(vec3 normal, float distance, vec3 low, vec3 high)
     return float(inside) / float(LINES * LINES) * (high[u] - low[u]) * (high[v] - low[v]) / size[axis];
 }
 
+/**
+ * How much more than the mean of all a face's surface what shows of it emits: where there is more than its plane has room
+ * for (`area_ratio` > 1), such as a panel below a ceiling, what glows hides the rest. `strongest`: channel of its emission.
+ */
+float unhidden(float area_ratio, vec3 emission, float strongest)
+{
+    float channel = max(emission.r, max(emission.g, emission.b));
+    return channel > 0.0 ? clamp(area_ratio, 1.0, max(strongest / channel, 1.0)) : 1.0;
+}
+
 void main()
 {
     int face = int(gl_FragCoord.y) * FACES_PER_ROW + int(gl_FragCoord.x);
@@ -71,8 +81,9 @@ void main()
     vec3 normal = normals.xyz - other_normals.xyz;
     normal /= max(length(normal), 1e-37);
     vec3 offset = (offsets.xyz + other_offsets.xyz) / area;
-    vec3 high = max(texelFetch(most, own, 0).xyz, texelFetch(most, other, 0).xyz) - 0.5;
-    vec3 low = max(texelFetch(least, own, 0).xyz, texelFetch(least, other, 0).xyz) - 0.5;
+    vec4 own_most = texelFetch(most, own, 0), other_most = texelFetch(most, other, 0);
+    vec4 own_least = texelFetch(least, own, 0), other_least = texelFetch(least, other, 0);
+    vec3 high = max(own_most.xyz, other_most.xyz) - 0.5, low = max(own_least.xyz, other_least.xyz) - 0.5;
     vec3 low_end = -reach(low), high_end = reach(high);
     float distance = dot(normal, offset), level_cell = grid_origins[texelFetch(face_places, own, 0).g >> 3u].w;
     float within = area_in_box(normal, distance, max(low_end, -0.5), min(high_end, vec3(0.5))) * level_cell * level_cell;
@@ -80,5 +91,6 @@ void main()
     out_plane = encode_plane(Plane(normal, distance, low_end, high_end, coverage));
     out_point = vec4(offset, base_color.a);
     out_albedo = vec4(base_color.rgb / area, 1.0);
-    out_emission = vec4((emissions.rgb + vec3(other_offsets.a, other_normals.a, other_emissions.a)) / area, 0.0);
+    vec3 emission = (emissions.rgb + vec3(other_offsets.a, other_normals.a, other_emissions.a)) / area;
+    out_emission = vec4(emission * unhidden(base_color.a / within, emission, max(own_most.a, other_least.a)), 0.0);
 }

@@ -66,7 +66,7 @@ void main()
     sum_offset = vec4(offset, back.r) * area;
     sum_normal = vec4(normal, back.g) * area;
     sum_emission = vec4(front, back.b) * area;
-    most = vec4(0.5 + min(high, 0.5), 0.0);
-    least = vec4(0.5 - max(low, -0.5), 0.0);
+    most = vec4(0.5 + min(high, 0.5), max(front.r, max(front.g, front.b)));
+    least = vec4(0.5 - max(low, -0.5), max(back.r, max(back.g, back.b)));
 #endif
 }
