@@ -66,10 +66,16 @@ class CasterList:
 
 def batch_bounds(mesh: Mesh, batch: InstanceBatch) -> Float64Array:
     """(2, 3) float64: lowest and highest corner of all instances, world space."""
+    bounds = instance_bounds(mesh, batch)
+    return np.stack([bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)])
+
+
+def instance_bounds(mesh: Mesh, batch: InstanceBatch) -> Float64Array:
+    """(N, 2, 3) float64: lowest and highest corner of each instance, world space."""
     center, half = mesh.bounds.mean(axis=0), 0.5 * (mesh.bounds[1] - mesh.bounds[0])
     centers = batch.matrices[:, :3, :3] @ center + batch.matrices[:, :3, 3]
     halves = np.abs(batch.matrices[:, :3, :3]) @ half
-    return np.stack([(centers - halves).min(axis=0), (centers + halves).max(axis=0)])
+    return np.stack([centers - halves, centers + halves], axis=1)
 
 
 def _gather(draws: Sequence[Draw], boxes: Sequence[Float64Array], numbers: Sequence[int] = ()) -> Casters:

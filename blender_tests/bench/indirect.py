@@ -12,8 +12,10 @@ from statistics import median
 import numpy as np
 
 from addon.render import Device, Renderer, gl_thread, stop_gl_thread
+from addon.render.casters import batch_bounds
 from addon.scene import Camera, Channel, IndirectMethod, IndirectSettings, Moment, RenderSettings, Scene, snapshot
 from addon.scene import Sequence as Frames
+from addon.scene.versions import new_version
 from blender_tests import builders, indirect_scenes
 from blender_tests.bench._runs import SHARED, report, snapshots, table
 from tooling.machine import machine
@@ -55,12 +57,33 @@ def moved_camera(moment: Moment, distance: float) -> Moment:
     return Moment(moment.scene, replace(moment.camera, world_from_camera=matrix))
 
 
+def moved_object(moment: Moment, distance: float) -> Moment:
+    """The smallest object moved sideways that is not smaller than such a step."""
+    sizes = {
+        batch.key: float(np.ptp(batch_bounds(moment.scene.meshes[batch.mesh], batch), axis=0).max())
+        for batch in moment.scene.batches
+    }
+    key = min((key for key in sizes if sizes[key] >= distance), key=lambda key: (sizes[key], key))
+    batches = tuple(
+        replace(batch, matrices=builders.translation(x=distance) @ batch.matrices, version=new_version())
+        if batch.key == key
+        else batch
+        for batch in moment.scene.batches
+    )
+    return Moment(replace(moment.scene, batches=batches), moment.camera)
+
+
 def at_rest(moment: Moment, _distance: float) -> Moment:
     """As it is."""
     return moment
 
 
-STATES: dict[str, Step] = {"at rest": at_rest, "moving light": moved_light, "moving camera": moved_camera}
+STATES: dict[str, Step] = {
+    "at rest": at_rest,
+    "moving light": moved_light,
+    "moving camera": moved_camera,
+    "moving object": moved_object,
+}
 
 
 def size_of(scene: Scene) -> float:
@@ -148,7 +171,7 @@ def measure(device: Device, scratch: Path) -> str:
     text += f"## Light through a wall\n\n{table(['thickness, cells', 'share of the light before it'], rows)}\n"
     return text + (
         f"Milliseconds of one sample, medians of {ROUNDS}. Cold: a new view, programs compiled; the others: the next "
-        "picture of a viewport in which nothing, every lamp or the camera moved. `radiance_grid` is all that the grid "
+        "picture of a viewport in which nothing, every lamp, the camera or a small object moved. `radiance_grid` is all that the grid "
         f"costs: filling, its direct light, its bounces.\n\n`python3 build.py bench {NAME}`: {WIDTH}×{HEIGHT}, default "
         f"settings. Machine: {machine()}; {device.name}.\n"
     )

@@ -10,8 +10,8 @@ uniform sampler2DArray emission_layers;
 #endif
 
 /**
- * Radiance (W/(sr·m²)) that a texel's surface sends on; RADIANCE: something lights it. SAMPLED_EMISSION: emissive surfaces are sampled as lights, and
- * what they emit counts as direct light.
+ * Radiance (W/(sr·m²)) that a texel's surface sends on; RADIANCE: something lights it. SAMPLED_EMISSION: emissive
+ * surfaces are sampled as lights, and what they emit counts as direct light.
  */
 vec3 shaded_radiance(ivec3 texel)
 {

@@ -11,8 +11,6 @@
 #include "common/gather.glsl"
 
 uniform sampler2DArray normal_layers;
-#ifdef RADIANCE
-#endif
 #ifdef BOUNCED
 uniform sampler2DArray base_color_layers;
 uniform sampler2DArray material_layers;

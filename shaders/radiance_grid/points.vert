@@ -6,6 +6,10 @@
 #include "generated/GridPointsUniforms.glsl"
 #include "radiance_grid/table.glsl"
 
+#ifndef OCCUPANCY
+uniform usampler2D face_sources; // not 0 where a face is kept from an earlier grid
+#endif
+
 in vec3 in_position;
 in vec3 in_normal;  // unit, of the triangle
 #ifndef OCCUPANCY
@@ -75,6 +79,7 @@ void main()
 #else
     uint entry = texelFetch(grid_cells, cell + ivec3(0, 0, int(level_size.w)), 0).r;
     int index = face_of(entry, orientation);
+    within = within && texelFetch(face_sources, face_texel(index), 0).r == 0u;
 #endif
     gl_Position = within ? at_texel(index) : NOWHERE;
 #ifdef TEXTURE

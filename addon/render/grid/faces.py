@@ -41,6 +41,12 @@ class Faces:
         return self.first[-1]
 
     @property
+    def cells(self) -> Int64Array:
+        """(N, 3) of each face the cell's x, y, z within its level."""
+        packed, mask = self.places[:, 0].astype(np.int64), (1 << _COORDINATE_BITS) - 1
+        return np.stack([packed & mask, packed >> _COORDINATE_BITS & mask, packed >> 2 * _COORDINATE_BITS], axis=1)
+
+    @property
     def rows(self) -> int:
         """Rows of a texture that holds them, at least one."""
         return max(-(-self.count // FACES_PER_ROW), 1)

@@ -5,33 +5,36 @@ Of the ways that were considered (see the README) this is the one that needs no 
 instances and deformed meshes at the cost of their points, and finds surfaces that hide behind any number of others.
 """
 
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import product, zip_longest
 from math import sqrt
 
 import moderngl
 import numpy as np
 
-from ...scene import Mesh, Scene, SlotRange
-from ...scene.arrays import Float32Array, Float64Array, UInt8Array
+from ...scene.arrays import BoolArray, Float32Array, Float64Array, UInt8Array
+from ..casters import batch_bounds
 from ..device import Device
 from ..draws import MATERIAL_UNIFORMS, Draw
-from ..geometry import INSTANCE_ATTRIBUTES, drawing_order, split_float64
+from ..geometry import INSTANCE_ATTRIBUTES, split_float64
 from ..indirect_plan import LARGEST_REFLECTANCE
-from ..mesh_lights import MeshLight
 from ..passes.base import Frame, UniformBuffer
 from ..passes.rasterize import SURFACES
 from ..programs import ProgramSpec
 from ..uniforms import UniformBlock
+from .changes import kept_cells, kept_marks, sources, world_box
+from .contents import unsampled_emission
 from .faces import ORIENTATIONS, number_faces
 from .levels import GridLevel
-from .points import POINTS_PER_CELL, REACH, SurfacePoints, surface_points
+from .point_buffers import PointCache
+from .points import REACH
 from .textures import (
     ADDED_UP,
     FACE_UNIFORMS,
     GREATEST,
     GRID_DEFINES,
+    SUMS,
     FaceDraw,
     GridTextures,
     face_program,
@@ -55,55 +58,63 @@ GRID_POINTS_UNIFORMS = UniformBlock(
 
 _OCCUPANCY_WIDTH = 4096
 _POINTS_BINDING, _MATERIAL_BINDING = 0, 1
-
-
-@dataclass
-class _PointBuffers:
-    """Points of one slot of a mesh on the GPU."""
-
-    points: SurfacePoints
-    attributes: list[tuple[moderngl.Buffer, str, str]]
-
-    def release(self) -> None:
-        for buffer, _, _ in self.attributes:
-            buffer.release()
+_KEEP_SAMPLERS = (*SUMS, "face_sources")
 
 
 class GridFill:
-    """Finds the faces of a scene and adds up their surfaces. Points of what did not change are kept."""
+    """Finds the faces of a scene and adds up their surfaces, where these are not as they were before."""
 
     def __init__(self, device: Device) -> None:
         self._device = device
         self._uniforms = UniformBuffer(device, GRID_POINTS_UNIFORMS)
+        self._keep = FaceDraw(device, FACE_UNIFORMS)
         self._planes = FaceDraw(device, FACE_UNIFORMS)
-        self._points: dict[Hashable, _PointBuffers] = {}
-        self._used: set[Hashable] = set()
+        self._points = PointCache(device)
 
-    def fill(self, frame: Frame, levels: tuple[GridLevel, ...]) -> GridTextures:
-        """The surfaces of a frame's scene in these levels. Raises RenderError where memory does not suffice."""
-        draws = frame.draws.of(frame.scene).draws
-        sampled = {light.key: light for light in frame.plan.lights.mesh_lights}
-        self._used = set()
-        marks = tuple(self._occupied(frame, draws, level) for level in levels)
-        faces = number_faces(levels, marks)
+    def fill(
+        self,
+        frame: Frame,
+        levels: tuple[GridLevel, ...],
+        before: GridTextures | None = None,
+        changed: Float64Array | None = None,
+    ) -> GridTextures:
+        """The surfaces of a frame's scene in these levels.
+
+        `before`: an earlier grid, of a scene that differs from this one only in a box, `changed` (2, 3), world space,
+        or nowhere. Cells that both have outside of that are taken from there.
+        Raises RenderError where memory does not suffice.
+        """
+        kept = _kept(levels, before, changed)
+        places = [
+            _Place(level, sum(below.size[2] for below in levels[:number]), world_box(~cells, level))
+            for number, (level, cells) in enumerate(zip(levels, kept, strict=True))
+        ]
+        marks: list[UInt8Array] = []
+        for number, (place, cells) in enumerate(zip(places, kept, strict=True)):
+            there = self._occupied(frame, place)
+            if before is not None and cells.any():
+                earlier = kept_marks(before.faces, before.levels[number], number, place.level, cells)
+                there = np.where(np.repeat(cells.ravel(), ORIENTATIONS), earlier, there)
+            marks.append(there)
+        faces = number_faces(levels, tuple(marks))
         textures = GridTextures(self._device, levels, faces, frame.settings.indirect.cell_rays)
-        self._add_up(frame, draws, textures, sampled)
+        if before is not None:
+            textures.take_from(sources(faces, kept, before.faces, _kept(before.levels, textures, changed)))
+        self._add_up(frame, textures, places, before)
         self._find_planes(textures)
-        for key in self._points.keys() - self._used:
-            self._points.pop(key).release()
+        self._points.keep(frame.scene, frame.draws.of(frame.scene).draws, levels)
         return textures
 
     def release(self) -> None:
         """Free everything."""
-        for points in self._points.values():
-            points.release()
-        self._points.clear()
-        self._uniforms.release()
-        self._planes.release()
+        for item in (self._points, self._uniforms, self._keep, self._planes):
+            item.release()
 
-    def _occupied(self, frame: Frame, draws: tuple[Draw, ...], level: GridLevel) -> UInt8Array:
-        """(6 · cells,) not 0 where a level has a face."""
-        count = ORIENTATIONS * level.count
+    def _occupied(self, frame: Frame, place: "_Place") -> UInt8Array:
+        """(6 · cells,) not 0 where a level has a face, as far as its place is not kept."""
+        count = ORIENTATIONS * place.level.count
+        if place.filled is None:
+            return np.zeros(count, np.uint8)
         size = (_OCCUPANCY_WIDTH, -(-count // _OCCUPANCY_WIDTH))
         texture = self._device.context.texture(size, 1, dtype="f1")
         framebuffer = self._device.context.framebuffer([texture])
@@ -112,8 +123,8 @@ class GridFill:
             framebuffer.use()
             framebuffer.clear()
             self._device.context.enable_only(moderngl.NOTHING)
-            for draw in draws:
-                self._draw(frame, draw, level, "OCCUPANCY", size)
+            for draw in place.draws(frame):
+                self._draw(frame, draw, place, "OCCUPANCY", size)
             self._device.context.finish()
             marks = np.frombuffer(framebuffer.read(components=1, alignment=1), np.uint8)[:count].reshape(-1, 2)
             return np.repeat(marks.max(axis=1), 2)  # what has a front has a back
@@ -123,39 +134,53 @@ class GridFill:
             texture.release()
 
     def _add_up(
-        self, frame: Frame, draws: tuple[Draw, ...], textures: GridTextures, sampled: Mapping[str, MeshLight]
+        self, frame: Frame, textures: GridTextures, places: Sequence["_Place"], before: GridTextures | None
     ) -> None:
         context = self._device.context
-        framebuffer = textures.framebuffer(*ADDED_UP, *GREATEST)
+        framebuffer = textures.framebuffer(*SUMS)
         framebuffer.viewport = (0, 0, *framebuffer.size)
         framebuffer.use()
         framebuffer.clear()
+        context.enable_only(moderngl.NOTHING)
+        if before is not None:
+            self._keep_sums(textures, before)
+        sampled = {light.key: light for light in frame.plan.lights.mesh_lights}
+        framebuffer.viewport = (0, 0, *framebuffer.size)
+        framebuffer.use()
         context.enable_only(moderngl.BLEND)
         context.blend_func = moderngl.ONE, moderngl.ONE
         for index in range(len(GREATEST)):
             self._device.raw.blend_greatest(len(ADDED_UP) + index)
-        bottom = 0
-        for level in textures.levels:
-            for draw in draws:
+        for place in places:
+            for draw in place.draws(frame):
                 glow = unsampled_emission(frame.scene, draw, sampled)
-                self._draw(frame, draw, level, "", framebuffer.size, bottom, glow, textures.cells)
-            bottom += level.size[2]
+                self._draw(frame, draw, place, "", framebuffer.size, glow, textures)
         self._device.raw.blend_sum()
         context.enable_only(moderngl.NOTHING)
+
+    def _keep_sums(self, textures: GridTextures, before: GridTextures) -> None:
+        """Take the sums of kept faces from an earlier grid."""
+        spec = self._keep.spec("radiance_grid/keep.frag", samplers=_KEEP_SAMPLERS)
+        textures.sources.use(spec.samplers.index("face_sources"))
+        for unit, name in enumerate(SUMS):
+            before.texture(name).use(unit)
+        whole = (0, textures.faces.count)
+        uniforms = face_uniforms(textures.levels, np.zeros(3), whole)
+        self._keep.draw(spec, textures.framebuffer(*SUMS), whole, uniforms)
 
     def _draw(
         self,
         frame: Frame,
         draw: Draw,
-        level: GridLevel,
+        place: "_Place",
         purpose: str,
         size: tuple[int, int],
-        bottom: int = 0,
         glow: Float32Array | None = None,
-        cells: moderngl.Texture3D | None = None,
+        textures: GridTextures | None = None,
     ) -> None:
         """Draw the points of a draw."""
-        points = self._points_of(frame.scene, draw, level)
+        level = place.level
+        points = self._points.of(frame.scene, draw, level)
         if points is None:
             return
         defines = {purpose} - {""} | draw.surface | ({"EMISSION"} if glow is not None else set[str]())
@@ -163,8 +188,9 @@ class GridFill:
         program = self._device.programs.get(spec)
         if draw.texture is not None and "TEXTURE" in draw.surface:
             frame.images.use(draw.texture, spec.samplers.index("base_color_texture"))
-        if cells is not None:
-            cells.use(spec.samplers.index("grid_cells"))
+        if textures is not None:
+            textures.cells.use(spec.samplers.index("grid_cells"))
+            textures.sources.use(spec.samplers.index("face_sources"))
         frame.draws.of(frame.scene).bind_material(draw, _MATERIAL_BINDING)
         content: list[tuple[object, ...]] = [item for item in points.attributes if item[2] in program]
         content.append((frame.geometry.instances(draw.batch), "4f 4f 4f 3f 4x/i", *INSTANCE_ATTRIBUTES[:4]))
@@ -178,7 +204,7 @@ class GridFill:
             _POINTS_BINDING,
             level_high=(*high, 0.0),
             level_low=(*low, 0.0),
-            level_size=(*level.size, bottom),
+            level_size=(*level.size, place.bottom),
             target_size=size,
             level_cell=level.cell,
             point_area=points.points.area,
@@ -191,49 +217,41 @@ class GridFill:
         if glow_buffer is not None:
             glow_buffer.release()
 
-    def _points_of(self, scene: Scene, draw: Draw, level: GridLevel) -> _PointBuffers | None:
-        """Points that are dense enough for a level; None where there are none."""
-        mesh, batch = scene.meshes[draw.batch.mesh], draw.batch
-        slot = next(slot for slot in mesh.slots if 3 * slot.first == draw.first_index)
-        density = POINTS_PER_CELL * (_largest_scale(batch.matrices) / level.cell) ** 2
-        box = _object_box(mesh, batch.matrices, level)
-        key = (mesh.key, mesh.version, slot.first, density, None if box is None else box.tobytes())
-        self._used.add(key)
-        if key not in self._points:
-            self._points[key] = self._upload(mesh, slot, density, box)
-        points = self._points[key]
-        return points if points.points.count else None
-
-    def _upload(self, mesh: Mesh, slot: SlotRange, density: float, box: Float64Array | None) -> _PointBuffers:
-        points = surface_points(mesh, slot, density, box)
-        arrays = (
-            (points.positions, "3f", "in_position"),
-            (points.normals, "3f", "in_normal"),
-            (points.uvs, "2f", "in_uv"),
-            (points.uv_scale, "1f", "in_uv_scale"),
-            (points.colors, "4f", "in_color"),
-            (points.reaches[:, 0], "4f1", "in_reach_low"),
-            (points.reaches[:, 1], "4f1", "in_reach_high"),
-        )
-        if points.count == 0:
-            return _PointBuffers(points, [])
-        context = self._device.context
-        held = [
-            (context.buffer(np.ascontiguousarray(array)), layout, name)
-            for array, layout, name in arrays
-            if array is not None
-        ]
-        return _PointBuffers(points, held)
-
     def _find_planes(self, textures: GridTextures) -> None:
-        sums = (*ADDED_UP, *GREATEST)
-        spec = self._planes.spec("radiance_grid/planes.frag", samplers=(*sums, "face_places"))
-        textures.places.use(len(sums))
-        for unit, name in enumerate(sums):
+        spec = self._planes.spec("radiance_grid/planes.frag", samplers=(*SUMS, "face_places"))
+        textures.places.use(len(SUMS))
+        for unit, name in enumerate(SUMS):
             textures.texture(name).use(unit)
         framebuffer = textures.framebuffer("planes", "points", "albedo", "emission")
         whole = (0, textures.faces.count)
         self._planes.draw(spec, framebuffer, whole, face_uniforms(textures.levels, np.zeros(3), whole))
+
+
+@dataclass(frozen=True)
+class _Place:
+    """A level, how far up its cells are in the table, and the box (2, 3) in world space around what of it is filled."""
+
+    level: GridLevel
+    bottom: int
+    filled: Float64Array | None
+
+    def draws(self, frame: Frame) -> Iterator[Draw]:
+        """The draws that have something there."""
+        if self.filled is None:
+            return
+        margin = 0.5 * self.level.cell
+        for draw in frame.draws.of(frame.scene).draws:
+            low, high = batch_bounds(frame.scene.meshes[draw.batch.mesh], draw.batch)
+            if (low <= self.filled[1] + margin).all() and (high >= self.filled[0] - margin).all():
+                yield draw
+
+
+def _kept(
+    levels: tuple[GridLevel, ...], other: GridTextures | None, changed: Float64Array | None
+) -> tuple[BoolArray, ...]:
+    """Per level (D, H, W) which cells hold what another grid's do."""
+    others = () if other is None else other.levels
+    return tuple(kept_cells(*pair, changed) for pair in zip_longest(levels, others[: len(levels)]))
 
 
 def points_program(defines: frozenset[str]) -> ProgramSpec:
@@ -243,48 +261,13 @@ def points_program(defines: frozenset[str]) -> ProgramSpec:
         fragment="radiance_grid/points.frag",
         defines=defines | GRID_DEFINES | {f"LARGEST_REFLECTANCE {LARGEST_REFLECTANCE}", f"REACH {REACH}"},
         blocks=(GRID_POINTS_UNIFORMS, MATERIAL_UNIFORMS),
-        samplers=("grid_cells", "base_color_texture"),
+        samplers=("grid_cells", "face_sources", "base_color_texture"),
     )
 
 
 def fill_variants() -> Iterator[ProgramSpec]:
     """Every program that fills the grid."""
-    yield face_program("radiance_grid/planes.frag", (FACE_UNIFORMS,), frozenset(), ())
+    yield face_program("radiance_grid/keep.frag", (FACE_UNIFORMS,), frozenset(), _KEEP_SAMPLERS)
+    yield face_program("radiance_grid/planes.frag", (FACE_UNIFORMS,), frozenset(), (*SUMS, "face_places"))
     for surface, purpose in product(SURFACES, ((), ("OCCUPANCY",), ("EMISSION",))):
         yield points_program(surface | frozenset(purpose))
-
-
-def unsampled_emission(scene: Scene, draw: Draw, sampled: Mapping[str, MeshLight]) -> Float32Array | None:
-    """(N, 2) float32 in drawing order: 1 where an instance's front and back emit light that no light is sampled for.
-
-    `sampled`: emissive surfaces that are lights, by key. None where the draw's material emits nothing.
-    """
-    batch, mesh = draw.batch, scene.meshes[draw.batch.mesh]
-    slot = next(slot for slot in mesh.slots if 3 * slot.first == draw.first_index)
-    if not scene.materials[batch.materials[min(slot.slot, len(batch.materials) - 1)]].is_emissive:
-        return None
-    glow = np.ones((batch.count, 2), np.float32)
-    for row, identity in enumerate(batch.ids.tolist()):
-        light = sampled.get(f"{batch.key}/{slot.slot}/{identity}")
-        if light is not None:
-            glow[row] = (not light.front, not light.back)
-    return glow[drawing_order(batch)]
-
-
-def _largest_scale(matrices: Float64Array) -> float:
-    """How many times longer than in object space anything is, at most, in any of the instances."""
-    return float(np.linalg.norm(matrices[:, :3, :3], axis=1).max())
-
-
-def _object_box(mesh: Mesh, matrices: Float64Array, level: GridLevel) -> Float64Array | None:
-    """(2, 3) what of object space a level holds of a mesh's only instance; None where all of the mesh is needed."""
-    if len(matrices) > 1:
-        return None
-    bounds = level.bounds
-    inverse = np.linalg.pinv(matrices[0, :3, :3])
-    corners = np.stack(np.meshgrid(*bounds.T, indexing="ij"), axis=-1).reshape(-1, 3) - matrices[0, :3, 3]
-    placed = corners @ inverse.T
-    low, high = placed.min(axis=0), placed.max(axis=0)
-    if (mesh.bounds[0] >= low).all() and (mesh.bounds[1] <= high).all():
-        return None
-    return np.stack([low, high])

@@ -9,8 +9,8 @@ from ...scene import Mesh, SlotRange
 from ...scene.arrays import Float32Array, Float64Array, Int64Array, UInt8Array, UInt32Array
 
 POINTS_PER_CELL = 12.0
-"""Points on as much surface as a side of a cell has: 8 leave holes (a closed ball of albedo .8 has .97 of its light, with
-12 .99)."""
+"""Points on as much surface as a side of a cell has: 8 leave holes (a closed ball of albedo .8 has .97 of its light,
+with 12 it has .99)."""
 
 REACH = 1.5
 """Times the points' spacing: how far from each its surface is taken to go on, unless its triangle ends before."""
@@ -27,8 +27,9 @@ class SurfacePoints:
 
     `positions`, `normals` (N, 3) float32: normals of the triangles, unit. `uvs` (N, 2) float32, `colors` (N, 4) float32
     or None where the mesh has none. `uv_scale` (N,) float32: how much of the UV map a metre of the triangle covers.
-    `area` (m²): what each point stands for. `reaches` (N, 2, 4) uint8: how far the surface around a point goes on towards
-    −x, −y, −z and +x, +y, +z, 255 for `REACH` times the points' spacing; it ends at the box around its triangle.
+    `area` (m²): what each point stands for. `reaches` (N, 2, 4) uint8: how far the surface around a point goes on
+    towards −x, −y, −z and +x, +y, +z, 255 for `REACH` times the points' spacing; it ends at the box around its
+    triangle.
     """
 
     positions: Float32Array

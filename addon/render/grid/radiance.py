@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 
 from ...scene import ShadingModel
-from ...scene.arrays import Float32Array
+from ...scene.arrays import Float32Array, Float64Array
 from ..device import Device
 from ..direct_needs import LIGHT_DEFINES, direct_needs, direct_program_defines
 from ..environment import ENVIRONMENT_DEFINE, ENVIRONMENT_SAMPLERS, ENVIRONMENT_UNIFORMS, environment_uniforms
@@ -30,6 +30,13 @@ from ..sampling import film_sample
 from ..uniforms import UniformBlock
 from .textures import FACE_UNIFORMS, FaceDraw, GridTextures, face_program, face_uniforms
 
+CHANGE_UNIFORMS = UniformBlock(
+    "ChangeUniforms",
+    (
+        ("changed_low", "vec4"),  # box around what is not as in the grid before, camera-relative, m
+        ("changed_high", "vec4"),
+    ),
+)
 SKY_UNIFORMS = UniformBlock("SkyUniforms", ENVIRONMENT_UNIFORMS)
 
 START_OFFSET = 0.25
@@ -50,6 +57,7 @@ _GREATEST_REST = 0.002
 _MOST_BOUNCES = 1024
 
 _FACE_SAMPLERS = ("grid_cells", "face_planes", "face_points", "face_places")
+_KEPT_SAMPLERS = (*_FACE_SAMPLERS, "face_sources", "face_moved", "links_before")
 _LIGHT_SAMPLERS = (*_FACE_SAMPLERS, *DIRECT_SAMPLERS, "ltc_table", "ggx_albedo_table")
 _FIRST_SAMPLERS = (*_FACE_SAMPLERS, "face_links", "face_emission", *ENVIRONMENT_SAMPLERS)
 _BOUNCE_SAMPLERS = (*_FACE_SAMPLERS, "face_albedo", "face_direct", "face_links", "face_first", "face_radiance")
@@ -72,6 +80,7 @@ class GridRadiance:
         self._light = FaceDraw(device, DIRECT_UNIFORMS, FACE_UNIFORMS)
         self._first = FaceDraw(device, FACE_UNIFORMS, SKY_UNIFORMS)
         self._bounce = FaceDraw(device, FACE_UNIFORMS)
+        self._links = FaceDraw(device, FACE_UNIFORMS, CHANGE_UNIFORMS)
 
     def light(self, frame: Frame, grid: GridTextures) -> None:
         """Find every face's irradiance by lamps and emissive surfaces, each by a few of its points."""
@@ -90,15 +99,29 @@ class GridRadiance:
             self._draw_light(lit, grid, 1.0 / _LIGHT_POINTS)
         context.enable_only(moderngl.NOTHING)
 
-    def link(self, frame: Frame, grid: GridTextures) -> None:
-        """Find which faces the rays of the coarse faces meet."""
-        self._device.context.enable_only(moderngl.NOTHING)
-        spec = self._bounce.spec("radiance_grid/links.frag", _DEFINES, _FACE_SAMPLERS)
-        self._bind_faces(spec, grid)
-        faces = (grid.faces.first[1], grid.faces.count)
-        for ray in range(grid.cell_rays):
-            uniforms = face_uniforms(grid.levels, frame.view.position, faces, ray=ray, ray_count=grid.cell_rays)
-            self._bounce.draw(spec, grid.link_framebuffer(ray), faces, uniforms)
+    def link(
+        self,
+        frame: Frame,
+        grid: GridTextures,
+        before: GridTextures | None = None,
+        changed: Float64Array | None = None,
+    ) -> None:
+        """Find which faces the rays of the coarse faces meet.
+
+        `before`: the grid that this one was filled from. Where that has the same levels, its rays are kept that come
+        from kept cells to kept cells and stay out of what `changed` (2, 3).
+        """
+        if before is None or changed is None or before.levels != grid.levels:
+            spec = self._links.spec("radiance_grid/links.frag", _DEFINES, _FACE_SAMPLERS)
+            self._draw_links(frame, grid, spec, np.zeros((2, 3)))
+            return
+        spec = self._links.spec("radiance_grid/links.frag", _DEFINES | {"KEPT"}, _KEPT_SAMPLERS)
+        moved = grid.places_of(before)
+        grid.sources.use(spec.samplers.index("face_sources"))
+        moved.use(spec.samplers.index("face_moved"))
+        before.links.use(spec.samplers.index("links_before"))
+        self._draw_links(frame, grid, spec, _cells_around(changed, grid.levels[-1].cell) - frame.view.position)
+        moved.release()
 
     def meet_first(self, frame: Frame, grid: GridTextures) -> None:
         """Find the coarse faces' irradiance by emission and by the world."""
@@ -134,8 +157,17 @@ class GridRadiance:
 
     def release(self) -> None:
         """Free everything."""
-        for item in (self._lights, self._light, self._first, self._bounce):
+        for item in (self._lights, self._light, self._first, self._bounce, self._links):
             item.release()
+
+    def _draw_links(self, frame: Frame, grid: GridTextures, spec: ProgramSpec, changed: Float64Array) -> None:
+        self._device.context.enable_only(moderngl.NOTHING)
+        self._bind_faces(spec, grid)
+        faces = (grid.faces.first[1], grid.faces.count)
+        box: dict[str, object] = {"changed_low": (*changed[0], 0.0), "changed_high": (*changed[1], 0.0)}
+        for ray in range(grid.cell_rays):
+            uniforms = face_uniforms(grid.levels, frame.view.position, faces, ray=ray, ray_count=grid.cell_rays)
+            self._links.draw(spec, grid.link_framebuffer(ray), faces, uniforms, box)
 
     def _draw_light(self, frame: Frame, grid: GridTextures, share: float) -> None:
         defines = _light_defines(frame)
@@ -170,7 +202,7 @@ class GridRadiance:
         grid.places.use(spec.samplers.index("face_places"))
         for unit, sampler in enumerate(spec.samplers):
             name = sampler.removeprefix("face_")
-            if sampler.startswith("face_") and name not in ("places", "links"):
+            if sampler.startswith("face_") and name not in ("places", "links", "sources", "moved"):
                 grid.texture(name).use(unit)
 
 
@@ -222,11 +254,15 @@ class _GridShadowMaps(ShadowMapsPass):
         return self.receivers
 
 
+def _cells_around(box: Float64Array, cell: float) -> Float64Array:
+    """(2, 3) a box that holds all cells of up to this size that a box (2, 3) touches, and what reaches out of them."""
+    return box + np.array([[-2.0 * cell], [2.0 * cell]])
+
+
 def grid_receivers(grid: GridTextures) -> Receivers:
     """The coarsest level's faces in blocks of as many cells as leave no more than `MOST_TILES` blocks."""
     level = grid.levels[-1]
-    packed = grid.faces.places[grid.faces.first[-2] :, 0].astype(np.int64)
-    cells = np.stack([packed & 1023, packed >> 10 & 1023, packed >> 20], axis=1)
+    cells = grid.faces.cells[grid.faces.first[-2] :]
     shift = 0
     while True:
         blocks = np.unique(cells >> shift, axis=0)
@@ -265,7 +301,9 @@ def radiance_variants() -> Iterator[ProgramSpec]:
     for wanted in program_defines(_FACE_NEEDS):
         defines = wanted - {"WORLD", "ENVIRONMENT", "EMISSION", "SPLIT"} | DIRECT_SIZES | _DEFINES
         yield face_program("radiance_grid/light.frag", (DIRECT_UNIFORMS, FACE_UNIFORMS), defines, _LIGHT_SAMPLERS)
-    yield face_program("radiance_grid/links.frag", (FACE_UNIFORMS,), _DEFINES, _FACE_SAMPLERS)
+    blocks = (FACE_UNIFORMS, CHANGE_UNIFORMS)
+    yield face_program("radiance_grid/links.frag", blocks, _DEFINES, _FACE_SAMPLERS)
+    yield face_program("radiance_grid/links.frag", blocks, _DEFINES | {"KEPT"}, _KEPT_SAMPLERS)
     for world in (frozenset[str](), frozenset({"WORLD"}), frozenset({"WORLD", ENVIRONMENT_DEFINE})):
         blocks = (FACE_UNIFORMS, SKY_UNIFORMS)
         yield face_program("radiance_grid/first.frag", blocks, world | _DEFINES, _FIRST_SAMPLERS)

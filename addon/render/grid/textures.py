@@ -6,7 +6,7 @@ from collections.abc import Callable, Hashable, Sequence
 import moderngl
 import numpy as np
 
-from ...scene.arrays import Float64Array
+from ...scene.arrays import Float64Array, UInt32Array
 from ..device import Device, RenderError
 from ..passes.base import UniformBuffer
 from ..programs import ProgramSpec
@@ -51,13 +51,14 @@ ADDED_UP = ("sum_base_color", "sum_offset", "sum_normal", "sum_emission")
 area's sum as alpha, the others what the points' backs emit: red, green and blue."""
 
 GREATEST = ("most", "least")
-"""The greatest of ½ plus and of ½ minus the points' offsets from the cell's centre, cells; as alpha, of the channels that
-their fronts and their backs emit."""
+"""The greatest of ½ plus and of ½ minus the points' offsets from the cell's centre, cells; as alpha, of the channels
+that their fronts and their backs emit."""
+
+SUMS = (*ADDED_UP, *GREATEST)
 
 _FLOATS = 4
 _FACE_TEXTURES = (
-    *ADDED_UP,
-    *GREATEST,
+    *SUMS,
     "points",
     "albedo",
     "emission",
@@ -68,16 +69,17 @@ _FACE_TEXTURES = (
     "next_indirect",
     "next_radiance",
 )
-BYTES_PER_FACE = 4 * _FLOATS * (len(_FACE_TEXTURES) + 1) + 8
+BYTES_PER_FACE = 4 * _FLOATS * (len(_FACE_TEXTURES) + 1) + 12
 """Without the rays from cell to cell, which take 4 bytes each."""
 
 
 class GridTextures:
-    """The textures of one grid. `levels`, `faces`: what is in them."""
+    """The textures of one grid. `levels`, `faces`: what is in them. `sources`: R32UI, see `take_from`."""
 
     def __init__(self, device: Device, levels: tuple[GridLevel, ...], faces: Faces, cell_rays: int) -> None:
         """Raises RenderError where graphics memory does not suffice."""
         context = device.context
+        self._device = device
         self.levels, self.faces, self.cell_rays = levels, faces, cell_rays
         table = faces.table
         self.cells = context.texture3d(table.shape[::-1], 1, np.ascontiguousarray(table), dtype="u4")
@@ -87,13 +89,14 @@ class GridTextures:
         places[: faces.count] = faces.places
         self.places = context.texture(size, 2, places, dtype="u4")
         self.places.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._taken = np.zeros(faces.count, np.uint32)
+        self.sources = self._numbers(_in_rows(self._taken, faces.rows))
         self._faces = {name: context.texture(size, _FLOATS, dtype="f4") for name in _FACE_TEXTURES}
         self._faces["planes"] = context.texture(size, _FLOATS, dtype="u4")
         for texture in self._faces.values():
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self.links = context.texture_array((*size, cell_rays), 1, dtype="u4")
         self.links.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._device = device
         self._framebuffers: dict[Hashable, moderngl.Framebuffer] = {}
         self.bytes = table.nbytes + faces.rows * FACES_PER_ROW * (BYTES_PER_FACE + 4 * cell_rays)
         try:
@@ -101,6 +104,24 @@ class GridTextures:
         except RenderError:
             self.release()
             raise
+
+    def take_from(self, sources: UInt32Array) -> None:
+        """Say of which of an earlier grid's faces each face has its surface: (N,) its number plus 1, 0 for none."""
+        self._taken = sources
+        self.sources.write(_in_rows(sources, self.faces.rows))
+
+    def places_of(self, before: "GridTextures") -> moderngl.Texture:
+        """R32UI: which face each of an earlier grid's became, its number plus 1, 0 for none. The caller frees it."""
+        taken = np.flatnonzero(self._taken)
+        become = np.zeros(before.faces.count, np.uint32)
+        become[self._taken[taken] - 1] = taken + 1
+        return self._numbers(_in_rows(become, before.faces.rows))
+
+    def _numbers(self, numbers: UInt32Array) -> moderngl.Texture:
+        size = (FACES_PER_ROW, len(numbers) // FACES_PER_ROW)
+        texture = self._device.context.texture(size, 1, numbers, dtype="u4")
+        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        return texture
 
     def texture(self, name: str) -> moderngl.Texture:
         """One of the faces' textures, `FACES_PER_ROW` texels wide: RGBA32F, "planes" RGBA32UI."""
@@ -138,8 +159,15 @@ class GridTextures:
         for framebuffer in self._framebuffers.values():
             framebuffer.release()
         self._framebuffers.clear()
-        for texture in (self.cells, self.places, self.links, *self._faces.values()):
+        for texture in (self.cells, self.places, self.sources, self.links, *self._faces.values()):
             texture.release()
+
+
+def _in_rows(numbers: UInt32Array, rows: int) -> UInt32Array:
+    """One number per face, filled up with zeros to whole rows."""
+    padded = np.zeros(rows * FACES_PER_ROW, np.uint32)
+    padded[: len(numbers)] = numbers
+    return padded
 
 
 def grid_uniforms(levels: Sequence[GridLevel], origin: Float64Array) -> dict[str, object]:

@@ -11,7 +11,8 @@ from ...scene import Scene
 from ...scene.arrays import Float64Array
 from ..casters import batch_bounds
 from ..device import Device
-from ..draws import SceneDraws
+from ..grid.changes import changed_box
+from ..grid.contents import GridContents, contents_key, grid_contents
 from ..grid.fill import GridFill, fill_variants
 from ..grid.levels import GridLevel, cell_size, grid_levels
 from ..grid.radiance import GridRadiance, radiance_variants
@@ -27,11 +28,10 @@ _SAME_CELLS = 1.5
 """A viewport keeps its cells until they are so many times larger or smaller than they should be."""
 
 _CLOSEST = 4.0
-"""A camera that comes near something typical of the scene gets cells so many times finer than when it sees all of it."""
+"""A camera that comes near something typical of the scene gets cells so many times finer than where it sees all."""
 
 _SEEN_SHARE = 0.8
 """Share of the picture whose depth decides how fine the cells are: what is farther may be any distance away."""
-
 
 SAMPLES_PER_LATTICE = 16
 """Samples of a film that share one grid: the next ones' cells lie elsewhere, so that what cells do to the picture
@@ -68,7 +68,8 @@ class RadianceGridPass:
         for other in self._grids.keys() - {0, lattice}:
             self._grids.pop(other).textures.release()
         grid = self._filled(frame, lattice, _levels(frame, self._seen, lattice))
-        light = (frame.scene.lights, frame.scene.world, frame.settings.indirect.bounces)
+        scene = frame.scene
+        light = (scene.lights, scene.world, frame.settings.indirect.bounces, frame.plan.indirect.world_gathered)
         if len(grid.light) == 0 or not all(one is other for one, other in zip(grid.light, light, strict=True)):
             self._radiance.light(frame, grid.textures)
             self._radiance.meet_first(frame, grid.textures)
@@ -85,16 +86,24 @@ class RadianceGridPass:
         self._radiance.release()
 
     def _filled(self, frame: Frame, lattice: int, levels: tuple[GridLevel, ...]) -> "_LitGrid":
-        """A grid of the frame's surfaces, from before where nothing changed."""
-        contents = _contents(frame, levels)
+        """A grid of the frame's surfaces: one from before, made anew only where something changed."""
         held = self._grids.get(lattice)
-        if held is None or held.contents != contents:
-            if held is not None:
-                self._grids.pop(lattice).textures.release()
-            held = _LitGrid(self._fill.fill(frame, levels), contents)
-            self._grids[lattice] = held
-            self._radiance.link(frame, held.textures)
-        return held
+        rays = frame.settings.indirect.cell_rays
+        if held is not None and held.holds(contents_key(frame), levels, rays):
+            return held
+        contents = grid_contents(frame)
+        before, changed = None, None
+        if held is not None and held.textures.cell_rays == rays:
+            before, changed = held.textures, changed_box(held.contents.surfaces, contents.surfaces)
+            if before.levels == levels and changed is None:
+                held.contents = contents
+                return held
+        filled = _LitGrid(self._fill.fill(frame, levels, before, changed), contents)
+        self._grids[lattice] = filled
+        self._radiance.link(frame, filled.textures, before, changed)
+        if held is not None:
+            held.textures.release()
+        return filled
 
 
 @dataclass
@@ -102,8 +111,13 @@ class _LitGrid:
     """A grid, what it was filled with, and what its light depends on: none where it is not lit."""
 
     textures: GridTextures
-    contents: Hashable
+    contents: GridContents
     light: tuple[object, ...] = ()
+
+    def holds(self, key: Hashable, levels: tuple[GridLevel, ...], cell_rays: int) -> bool:
+        """Whether it has these surfaces in these levels, and as many rays."""
+        textures = self.textures
+        return self.contents.key == key and textures.levels == levels and textures.cell_rays == cell_rays
 
 
 @dataclass(frozen=True)
@@ -149,18 +163,3 @@ def scene_boxes(scene: Scene) -> Float64Array:
     """(N, 2, 3) lowest and highest corner of all instances of each batch, world space; at least one box."""
     boxes = [batch_bounds(scene.meshes[batch.mesh], batch) for batch in scene.batches if batch.count]
     return np.array(boxes or [np.zeros((2, 3))])
-
-
-def _contents(frame: Frame, levels: tuple[GridLevel, ...]) -> Hashable:
-    """Equal where the grid holds the same surfaces."""
-    draws: SceneDraws = frame.draws.of(frame.scene)
-    scene = frame.scene
-    surfaces = tuple(
-        (draw.batch.key, draw.batch.version, draw.batch.mesh, scene.meshes[draw.batch.mesh].version, draw.first_index)
-        for draw in draws.draws
-    )
-    materials = tuple((material.key, material.version) for material in scene.materials.values())
-    images = tuple((image.key, image.version) for image in scene.images.values())
-    sampled = tuple((light.key, light.front, light.back) for light in frame.plan.lights.mesh_lights)
-    indirect = frame.settings.indirect
-    return levels, surfaces, materials, images, sampled, indirect.cell_rays, frame.plan.indirect.world_gathered
