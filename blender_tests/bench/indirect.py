@@ -171,9 +171,9 @@ def measure(device: Device, scratch: Path) -> str:
     text += f"## Light through a wall\n\n{table(['thickness, cells', 'share of the light before it'], rows)}\n"
     return text + (
         f"Milliseconds of one sample, medians of {ROUNDS}. Cold: a new view, programs compiled; the others: the next "
-        "picture of a viewport in which nothing, every lamp, the camera or a small object moved. `radiance_grid` is all that the grid "
-        f"costs: filling, its direct light, its bounces.\n\n`python3 build.py bench {NAME}`: {WIDTH}×{HEIGHT}, default "
-        f"settings. Machine: {machine()}; {device.name}.\n"
+        "picture of a viewport in which nothing, every lamp, the camera or a small object moved. `radiance_grid` is "
+        "all that the grid costs: filling, its direct light, its bounces.\n\n"
+        f"`python3 build.py bench {NAME}`: {WIDTH}×{HEIGHT}, default settings. Machine: {machine()}; {device.name}.\n"
     )
 
 

@@ -101,7 +101,7 @@ def test_a_changed_scene_looks_as_if_it_were_new(shared_session, render, change)
 
 
 def test_what_did_not_change_is_not_filled_again(shared_session):
-    """A wall gets another colour on the sly, without a new version, and a block moves: the grid has the wall's old one."""
+    """A wall gets another colour on the sly, without a new version, and a block moves: the grid keeps its old one."""
     scene = room()
     sly = replace(
         scene, materials={**scene.materials, "red": replace(scene.materials["red"], base_color=(0.0, 0.0, 0.9))}

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where the levels of the radiance grid are and how large their cells. Pure: no OpenGL, no Blender."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, log2
 
@@ -17,6 +18,9 @@ _MOST_CELLS = 160
 _SPREAD = 1.25
 """Sides of other levels over that of what is seen, which is within the finest."""
 
+_FACES_PER_AREA = 2.2
+"""Faces per square of a cell's side of surface, as Cornell and Sponza have them: both sides, and cells only touched."""
+
 _FARTHEST = 1e9
 """Cells from the world's origin: beyond, float64 tells positions inside a cell apart no better than float32."""
 
@@ -27,10 +31,11 @@ _SNAP = 8
 """A level that does not cover the scene moves by so many of its cells at a time."""
 
 _STEPS_PER_OCTAVE = 4
+COARSER = 2.0 ** (1.0 / _STEPS_PER_OCTAVE)
 """Cell sizes are rounded so, lest every movement of the camera be another grid."""
 
 BYTES_PER_CELL = 4
-"""Of the table of cells; what is in them comes on top: `faces.BYTES_PER_FACE`."""
+"""Of the table of cells; what is in them comes on top: `textures.bytes_per_face`."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +78,17 @@ def cell_size(seen: Float64Array, cells: int) -> float:
     return 2.0 ** (ceil(_STEPS_PER_OCTAVE * log2(side / cells)) / _STEPS_PER_OCTAVE)
 
 
+def expected_faces(levels: Sequence[GridLevel], boxes: Float64Array, areas: Float64Array) -> float:
+    """About how many faces levels have: `areas` (N,) m² of surface, each spread over a box of `boxes` (N, 2, 3)."""
+    total = 0.0
+    for level in levels:
+        low, high = boxes[:, 0] - 0.5 * level.cell, boxes[:, 1] + 0.5 * level.cell
+        within = np.minimum(high, level.bounds[1]) - np.maximum(low, level.bounds[0])
+        shares = np.clip(within / (high - low), 0.0, 1.0).prod(axis=1)
+        total += _FACES_PER_AREA * float((areas * shares).sum()) / level.cell**2
+    return total
+
+
 def lattice_shift(index: int) -> tuple[float, float, float]:
     """Shift (cells, 0…1) of one of many lattices against the world's origin, evenly spread whatever their number.
 
@@ -97,7 +113,7 @@ def grid_levels(
         levels = _levels(bounds, center, cell, span, lattice_shift(lattice))
         if BYTES_PER_CELL * sum(level.count for level in levels) <= memory or levels[0].count <= 8:
             return levels
-        cell *= 2.0 ** (1.0 / _STEPS_PER_OCTAVE)
+        cell *= COARSER
 
 
 def _levels(

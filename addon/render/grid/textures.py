@@ -69,8 +69,12 @@ _FACE_TEXTURES = (
     "next_indirect",
     "next_radiance",
 )
-BYTES_PER_FACE = 4 * _FLOATS * (len(_FACE_TEXTURES) + 1) + 12
-"""Without the rays from cell to cell, which take 4 bytes each."""
+_BYTES_PER_FACE = 4 * _FLOATS * (len(_FACE_TEXTURES) + 1) + 12
+
+
+def bytes_per_face(cell_rays: int) -> int:
+    """Graphics memory of a face from which so many rays bring light."""
+    return _BYTES_PER_FACE + 4 * cell_rays
 
 
 class GridTextures:
@@ -98,7 +102,7 @@ class GridTextures:
         self.links = context.texture_array((*size, cell_rays), 1, dtype="u4")
         self.links.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._framebuffers: dict[Hashable, moderngl.Framebuffer] = {}
-        self.bytes = table.nbytes + faces.rows * FACES_PER_ROW * (BYTES_PER_FACE + 4 * cell_rays)
+        self.bytes = table.nbytes + faces.rows * FACES_PER_ROW * bytes_per_face(cell_rays)
         try:
             device.check_upload(f"the radiance grid of {faces.count} faces", self.bytes)
         except RenderError:
