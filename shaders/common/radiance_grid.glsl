@@ -57,18 +57,17 @@ struct GridHit
 /**
  * The first face that a ray meets from its front, after Amanatides and Woo 1987, "A Fast Voxel Traversal Algorithm".
  *
- * `start` (m): nothing nearer is met. `random`, in 0…1, another for each ray: surfaces that fill a part of their box are
- * met by as many rays. It goes through each level from `first_level` on for `grid_reach` cells at most,
- * then through the next coarser one.
+ * `random`, in 0…1, another for each ray: surfaces that fill a part of their box are met by as many rays. It goes through
+ * each level from `first_level` on for `grid_reach` cells at most, then through the next coarser one.
  */
-GridHit trace_grid(vec3 origin, vec3 direction, int first_level, float start, float random)
+GridHit trace_grid(vec3 origin, vec3 direction, int first_level, float random)
 {
     const float FAR = 1e30;
     uint facing = facing_orientations(direction);
     vec3 inverse_direction = 1.0 / mix(direction, vec3(1e-12), lessThan(abs(direction), vec3(1e-12)));
     ivec3 forward = ivec3(sign(inverse_direction));
     GridHit hit = GridHit(NO_FACE, FAR);
-    float travelled = start;
+    float travelled = 0.0;
     for (int level = first_level; level < grid_level_count && hit.face == NO_FACE; ++level) {
         float cell_size = grid_cell_size(level);
         vec3 size = grid_sizes[level].xyz;

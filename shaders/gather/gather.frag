@@ -118,7 +118,6 @@ void main()
         // Not what chose the direction, or where a ray looks would decide where it steps and what it meets.
         float jitter = fract(hash_to_unit(uvec2(texel)).x + gather_shift.x + float(ray) * 0.6180339887498949);
         vec3 radiance = vec3(0.0);
-        float start = 0.0;
         bool met = false;
 #ifdef CONTACT
         float reach = CONTACT_REACH * grid_cell_size(level);
@@ -130,10 +129,9 @@ void main()
             marched += 1.0;
             origins.r += 1.0;
         }
-        start = 0.0;
 #endif
         if (!met) {
-            GridHit far = trace_grid(position + offset * normal, direction, level, start, jitter);
+            GridHit far = trace_grid(position + offset * normal, direction, level, jitter);
             if (far.face != NO_FACE) {
                 radiance = texelFetch(face_radiance, face_texel(far.face), 0).rgb;
                 origins.g += 1.0;

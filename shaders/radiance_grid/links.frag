@@ -57,5 +57,5 @@ void main()
     if (kept_link(face, origin, direction, out_link))
         return;
 #endif
-    out_link = uint(trace_grid(origin, direction, from.level, 0.0, random).face + 1);
+    out_link = uint(trace_grid(origin, direction, from.level, random).face + 1);
 }
