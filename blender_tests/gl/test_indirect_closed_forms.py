@@ -269,11 +269,23 @@ def noise_of(session, scene, camera, indirect, samples):
     return relative_difference(one, other)
 
 
+MEAN_NOISE = {
+    IndirectMethod.OCCLUSION: 8e-4,
+    IndirectMethod.SSAO: 2e-4,
+    IndirectMethod.RADIOSITY: 6e-3,
+    IndirectMethod.DEEP_MARCH: 3e-3,
+    IndirectMethod.MARCH_GRID: 1e-3,
+}
+"""Relative standard deviation of the difference of two such pictures' means, of 32 samples: all pixels share a sample's
+shift, so that their noise does not average out among them. Measured over nine pairs of seeds; a quarter of it, or less,
+is left at 512 samples."""
+
+
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("quarters", [1, 2])
 def test_a_camera_that_is_rolled_shows_the_same_light(shared_session, method, quarters):
     """By quarters of a turn every pixel shows the same point: what differs is noise, of which four times as many
-    samples leave about half."""
+    samples leave about half, and the means differ by no more than three standard deviations of theirs."""
     scene = replace(cornell(LAMP), world=replace(cornell().world, radiance=(0.2, 0.1, 0.3)))
     rolled = looking((0.0, -3.6, 0.0), (0.0, 0.0, 0.0), half_width=0.38, roll=0.5 * np.pi * quarters)
     differences = []
@@ -285,7 +297,7 @@ def test_a_camera_that_is_rolled_shows_the_same_light(shared_session, method, qu
         turned = np.rot90(other, -quarters)
         differences.append(relative_difference(turned[same], upright[same]))
     assert differences[1] < 0.65 * differences[0] + 1e-3
-    assert abs(turned[same].mean() / upright[same].mean() - 1.0) < 0.01
+    assert abs(turned[same].mean() / upright[same].mean() - 1.0) < 3.0 * MEAN_NOISE[method]
 
 
 @pytest.mark.parametrize("degrees", [15.0, 45.0])

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fills the radiance grid: points on the scene's surfaces are drawn, each into the texel of the face it belongs to.
 
-Of the ways that were considered (see the README) this is the one that needs no more than OpenGL 4.1, copes with
-instances and deformed meshes at the cost of their points, and finds surfaces that hide behind any number of others.
+Of the ways that were measured (blender_tests/bench/results/filling.md) this one needs no more than OpenGL 4.1, finds
+surfaces that hide behind any number of others, and does not depend on where cells lie.
 """
 
 from collections.abc import Iterator, Sequence

@@ -15,6 +15,9 @@ MOST_LEVELS = 6
 _MOST_CELLS = 160
 """Cells along each side of a level that covers the scene at most."""
 
+_FEWEST_CELLS = 3**3
+"""Of a level that covers the scene, however large they are."""
+
 _SPREAD = 1.25
 """Sides of other levels over that of what is seen, which is within the finest."""
 
@@ -84,7 +87,7 @@ def expected_faces(levels: Sequence[GridLevel], boxes: Float64Array, areas: Floa
     for level in levels:
         low, high = boxes[:, 0] - 0.5 * level.cell, boxes[:, 1] + 0.5 * level.cell
         within = np.minimum(high, level.bounds[1]) - np.maximum(low, level.bounds[0])
-        shares = np.clip(within / (high - low), 0.0, 1.0).prod(axis=1)
+        shares = np.clip(within / np.maximum(high - low, level.cell), 0.0, 1.0).prod(axis=1)
         total += _FACES_PER_AREA * float((areas * shares).sum()) / level.cell**2
     return total
 
@@ -111,7 +114,8 @@ def grid_levels(
     span = min(max(int(_SPREAD * cells), 2 * _SNAP), _MOST_CELLS)
     while True:
         levels = _levels(bounds, center, cell, span, lattice_shift(lattice))
-        if BYTES_PER_CELL * sum(level.count for level in levels) <= memory or levels[0].count <= 8:
+        counts = [level.count for level in levels]
+        if BYTES_PER_CELL * sum(counts) <= memory or max(counts) <= _FEWEST_CELLS:
             return levels
         cell *= COARSER
 

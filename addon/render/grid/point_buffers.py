@@ -16,7 +16,8 @@ from .levels import GridLevel
 from .points import POINTS_PER_CELL, SurfacePoints, surface_points
 
 _DENSITIES_PER_OCTAVE = 32
-_ROUNDING = 1e-6
+_ROUNDING = 1e-3
+"""Steps: what float32 makes of a turned matrix (1e-7, times the steps per octave) must not be another density."""
 
 
 @dataclass

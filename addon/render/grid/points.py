@@ -131,6 +131,8 @@ def _near_box(corners: Float64Array, box: Float64Array) -> tuple[Float64Array, I
             break
         corners, places = _quartered(corners[large]), _quartered(places[large])
         source = np.repeat(source[large], 4)
+    else:
+        done.append((corners, source, places))
     parts = zip(*done, strict=True)
     return tuple(np.concatenate(part) for part in parts)  # pyright: ignore[reportReturnType]
 
@@ -153,7 +155,8 @@ def _uv_scale(
     a, b = uvs[:, 1] - uvs[:, 0], uvs[:, 2] - uvs[:, 0]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.sqrt((across**2).sum(axis=1))
-    return np.sqrt(np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / np.maximum(area, 1e-300)).astype(np.float32)
+    scale = np.sqrt(np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / np.maximum(area, 1e-300))
+    return np.minimum(scale, np.finfo(np.float32).max).astype(np.float32)
 
 
 def _none(mesh: Mesh) -> SurfacePoints:
