@@ -4,6 +4,7 @@
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -101,18 +102,34 @@ class _Expansion:
             raise ShaderError(f"shader file {path} cannot be read: {error}") from error
 
 
+class _Joined(NamedTuple):
+    """A file with its includes, before anything is defined: its text, their names, and all identifiers in it."""
+
+    text: str
+    files: tuple[str, ...]
+    identifiers: frozenset[str]
+
+
+def _join(path: str, blocks: tuple[UniformBlock, ...], generated: tuple[tuple[str, str], ...]) -> _Joined:
+    """The file and all that it includes, which is the same for many variants. Raises ShaderError."""
+    expansion = _Expansion({block.name: block.glsl for block in blocks} | dict(generated))
+    expansion.add(path)
+    text = "\n".join([*expansion.lines, ""])
+    return _Joined(text, tuple(expansion.files), frozenset(_IDENTIFIER.findall(text)))
+
+
+def _define(joined: _Joined, defines: frozenset[str]) -> ExpandedSource:
+    """The source with those of the defines that it mentions."""
+    mentioned = [f"#define {define}\n" for define in sorted(defines) if define.split()[0] in joined.identifiers]
+    return ExpandedSource("".join([GLSL_VERSION, "\n", *mentioned, joined.text]), joined.files)
+
+
 def expand(path: str, spec: ProgramSpec) -> ExpandedSource:
     """One stage's full source: version, the defines that it mentions, then the file with its includes.
 
     Raises ShaderError.
     """
-    generated = {block.name: block.glsl for block in spec.blocks} | dict(spec.generated)
-    expansion = _Expansion(generated)
-    expansion.add(path)
-    text = "\n".join([*expansion.lines, ""])
-    mentioned = set(_IDENTIFIER.findall(text))
-    defines = [f"#define {define}\n" for define in sorted(spec.defines) if define.split()[0] in mentioned]
-    return ExpandedSource("".join([GLSL_VERSION, "\n", *defines, text]), tuple(expansion.files))
+    return _define(_join(path, spec.blocks, spec.generated), spec.defines)
 
 
 def name_files(log: str, files: tuple[str, ...]) -> str:
@@ -170,9 +187,10 @@ def all_variants() -> Iterator[tuple[str, str, ExpandedSource]]:
     from .passes import PASSES
 
     seen: set[str] = set()
+    join = lru_cache(maxsize=None)(_join)
     for spec in (spec for render_pass in PASSES for spec in render_pass.variants()):
         for stage, path in spec.stages:
-            source = expand(path, spec)
+            source = _define(join(path, spec.blocks, spec.generated), spec.defines)
             if source.text not in seen:
                 seen.add(source.text)
                 yield f"{path} {' '.join(sorted(spec.defines))}".strip(), stage, source

@@ -64,7 +64,8 @@ def kept_cells(level: GridLevel, before: GridLevel | None, changed: Float64Array
     kept[_cells(start, start + before.size, level)] = True
     if changed is not None:
         ends = changed / level.cell - level.shift + np.array([[-_ROUNDING], [_ROUNDING]])
-        cells = np.floor(np.clip(np.nan_to_num(ends), -_FARTHEST, _FARTHEST)).astype(np.int64) - level.lowest
+        ends = np.where(np.isnan(ends), [[-_FARTHEST], [_FARTHEST]], ends)  # what is nobody knows where may be anywhere
+        cells = np.floor(np.clip(ends, -_FARTHEST, _FARTHEST)).astype(np.int64) - level.lowest
         kept[_cells(cells[0], cells[1] + 1, level)] = False
     return kept
 

@@ -18,7 +18,8 @@ REACH = 1.5
 MOST_POINTS = 1 << 22
 """Points of one slot of one mesh at most; where that is too few, they are farther apart."""
 
-_HALVINGS = 24
+_HALVINGS = 40
+"""Triangles that are larger than a box by more than so many have no exact place in it."""
 
 
 @dataclass(frozen=True)
@@ -58,8 +59,8 @@ def surface_points(mesh: Mesh, slot: SlotRange, density: float, box: Float64Arra
     source = np.arange(len(triangles))
     places = np.broadcast_to(np.eye(3), (len(triangles), 3, 3))
     if box is not None:
-        corners, source, places = _near_box(corners, box)
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        corners, source, places = _near_box(corners, box, density)
+    across = _across(corners)
     double = np.sqrt((across**2).sum(axis=1))
     total = 0.5 * float(double.sum())
     if not (total > 0.0 and np.isfinite(total)):
@@ -113,10 +114,18 @@ def _triangle_lattice(numbers: Int64Array) -> Float64Array:
     return np.stack([1.0 - root, root * (1.0 - u[:, 1]), root * u[:, 1]], axis=1)
 
 
-def _near_box(corners: Float64Array, box: Float64Array) -> tuple[Float64Array, Int64Array, Float64Array]:
+def _across(corners: Float64Array) -> Float64Array:
+    """(T, 3) along the normals of triangles (T, 3, 3), as long as twice their areas."""
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+def _near_box(
+    corners: Float64Array, box: Float64Array, density: float
+) -> tuple[Float64Array, Int64Array, Float64Array]:
     """Triangles (T, 3, 3) cut into smaller ones of which those that may touch a box are left.
 
-    Also which one each came from, and the barycentric coordinates (·, 3, 3) there of its corners.
+    Also which one each came from, and the barycentric coordinates (·, 3, 3) there of its corners. What has no more than
+    a point is not cut: the parts of a triangle without area would lie upon one another, ever more of them.
     """
     source = np.arange(len(corners))
     places = np.broadcast_to(np.eye(3), (len(corners), 3, 3))
@@ -126,13 +135,12 @@ def _near_box(corners: Float64Array, box: Float64Array) -> tuple[Float64Array, I
         touches = (corners.min(axis=1) <= box[1]).all(axis=1) & (corners.max(axis=1) >= box[0]).all(axis=1)
         corners, source, places = corners[touches], source[touches], places[touches]
         large = (corners.max(axis=1) - corners.min(axis=1)).max(axis=1) > 0.5 * side
+        large[large] = np.sqrt((_across(corners[large]) ** 2).sum(axis=1)) * density > 2.0
         done.append((corners[~large], source[~large], places[~large]))
         if not large.any():
             break
         corners, places = _quartered(corners[large]), _quartered(places[large])
         source = np.repeat(source[large], 4)
-    else:
-        done.append((corners, source, places))
     parts = zip(*done, strict=True)
     return tuple(np.concatenate(part) for part in parts)  # pyright: ignore[reportReturnType]
 
@@ -153,8 +161,7 @@ def _uv_scale(
         return np.zeros(len(corners), np.float32)
     uvs = (places[..., None] * mesh.uvs[triangles[source]].astype(np.float64)[:, None]).sum(axis=2)
     a, b = uvs[:, 1] - uvs[:, 0], uvs[:, 2] - uvs[:, 0]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.sqrt((across**2).sum(axis=1))
+    area = np.sqrt((_across(corners) ** 2).sum(axis=1))
     scale = np.sqrt(np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / np.maximum(area, 1e-300))
     return np.minimum(scale, np.finfo(np.float32).max).astype(np.float32)
 
