@@ -277,8 +277,7 @@ MEAN_NOISE = {
     IndirectMethod.MARCH_GRID: 1e-3,
 }
 """Relative standard deviation of the difference of two such pictures' means, of 32 samples: all pixels share a sample's
-shift, so that their noise does not average out among them. Measured over nine pairs of seeds; a quarter of it, or less,
-is left at 512 samples."""
+shift, so that their noise does not average out among them. Estimated from pairs of three seeds, rounded up."""
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -207,7 +207,7 @@ class GridFill:
             level_size=(*level.size, place.bottom),
             target_size=size,
             level_cell=level.cell,
-            point_area=points.points.area,
+            point_area=min(points.points.area, float(np.finfo(np.float32).max)),
             point_spacing=sqrt(points.points.area),
             alpha_threshold=frame.settings.alpha_threshold,
         )
