@@ -3,7 +3,16 @@
 
 from dataclasses import dataclass
 
-from ..scene import DebugView, IndirectMethod, IndirectSettings, Material, RenderSettings, Scene, ShadingModel
+from ..scene import (
+    ALL_GROUPS,
+    DebugView,
+    IndirectMethod,
+    IndirectSettings,
+    Material,
+    RenderSettings,
+    Scene,
+    ShadingModel,
+)
 from ..scene.indirect import BOUNCING_METHODS, RAY_METHODS, WORLD_METHODS
 from .layout import TargetSpec
 from .planned_pass import LeftOut, PlannedPass
@@ -109,6 +118,17 @@ def reflectance_warnings(scene: Scene, needs: IndirectNeeds) -> tuple[str, ...]:
         f"for indirect light {LARGEST_REFLECTANCE} is used."
         for material in scene.materials.values()
         if max(material.base_color) > LARGEST_REFLECTANCE
+    )
+
+
+def linking_warnings(scene: Scene, needs: IndirectNeeds) -> tuple[str, ...]:
+    """A sentence for each linked light whose indirect light falls on more than its direct light does."""
+    if needs.method is not IndirectMethod.MARCH_GRID:
+        return ()
+    return tuple(
+        f'Light "{light.name}" is linked: its indirect light is found as if it lit everything.'
+        for light in scene.lights
+        if light.receiver_groups != ALL_GROUPS
     )
 
 
@@ -239,6 +259,10 @@ def _radiosity_defines(scene: Scene, settings: RenderSettings) -> set[str]:
 def plan_filters(
     settings: RenderSettings, written: str, left_out: list[LeftOut], *, blends: bool, filters: bool
 ) -> tuple[PlannedPass, ...]:
+    """The passes after the one that has `written` noisy irradiance, and why others are left out.
+
+    `blends`: whether there are pictures before to blend with. `filters`: whether noise is smoothed between pixels.
+    """
     indirect = settings.indirect
     passes: list[PlannedPass] = []
     if blends:

@@ -14,7 +14,7 @@ from .environment import EnvironmentTextures
 from .film import Film
 from .geometry import GeometryStore
 from .images import ImageStore
-from .indirect_plan import reflectance_warnings
+from .indirect_plan import linking_warnings, reflectance_warnings
 from .layering import Trial, calibration_view, resolved
 from .lighting import Lighting
 from .memory import Memory
@@ -99,7 +99,7 @@ class Renderer:
             history=frames.history,
             ahead=frames.ahead,
             continuous=sequence.continuous,
-            picture=self._pictures,
+            picture=self._pictures if sequence.continuous else 0,
         )
         self._pictures += sequence.continuous
         self._prepare_passes(self._frame)
@@ -165,7 +165,9 @@ class Renderer:
             draws=len(draws.seen),
             instances=sum(batch.count for batch in frame.scene.batches if batch.seen_by_camera),
             bytes=sizes,
-            warnings=self._warnings + reflectance_warnings(frame.scene, frame.plan.indirect),
+            warnings=self._warnings
+            + reflectance_warnings(frame.scene, frame.plan.indirect)
+            + linking_warnings(frame.scene, frame.plan.indirect),
             device=self._device.name,
             shadow_maps_drawn=shadows.drawn if shadows else 0,
             shadow_maps_kept=shadows.kept if shadows else 0,

@@ -33,7 +33,7 @@ def _same(first: object, second: object) -> bool:
 
 
 def with_versions(scene: Scene, previous: Scene) -> Scene:
-    """`scene` with versions raised where it differs from `previous`, or `previous` itself."""
+    """`scene` with versions raised where it differs from `previous`, or `previous` itself. What is equal is shared."""
     changed = {
         "geometry": not _same_items(scene.meshes, previous.meshes),
         "transforms": not _same_batches(scene.batches, previous.batches),
@@ -47,7 +47,8 @@ def with_versions(scene: Scene, previous: Scene) -> Scene:
     raised = {name: new_version() for name, differs in changed.items() if differs}
     if not raised:
         return previous
-    return replace(scene, versions=replace(previous.versions, **raised))
+    shared = {name: getattr(previous, name) for name in ("lights", "camera", "world") if not changed[name]}
+    return replace(scene, versions=replace(previous.versions, **raised), **shared)
 
 
 def _same_items(first: Mapping[str, object], second: Mapping[str, object]) -> bool:

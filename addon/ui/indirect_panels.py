@@ -88,9 +88,7 @@ class _QualityPanel(_MethodPanel):
         column.prop(quality, "preset")
         for number in fields(QualityNumbers):
             if number.name in READ[indirect.method]:
-                row = column.column()
-                row.active = number.name != "cells" or indirect.cell_size == 0.0
-                row.prop(quality, number.name)
+                column.prop(quality, number.name)
 
 
 class DEEP_GBUFFER_PT_indirect_viewport(_QualityPanel, bpy.types.Panel):

@@ -86,12 +86,11 @@ class DeepGBufferIndirectQuality(bpy.types.PropertyGroup):
     )
     cells: IntProperty(
         name="Grid Cells",
-        description="Cells of the radiance grid along the longest side of what is seen, where the Cell Size is "
-        "automatic: more show smaller shadows and less light through thin walls",
+        description="Cells of the radiance grid along the longest side of what is seen: more show smaller shadows and "
+        "let less light through thin walls. With a Cell Size of your own: along what the finest cover",
         default=_DEFAULT.cells,
         min=8,
-        soft_max=128,
-        max=512,
+        max=128,
         update=changed,
     )
     cell_rays: IntProperty(
@@ -173,7 +172,8 @@ class DeepGBufferIndirectSettings(bpy.types.PropertyGroup):
     )
     grid_memory: EnumProperty(
         name="Memory Limit",
-        description="Graphics memory of all cells: with less, cells are larger",
+        description="Graphics memory of the cells: with less, they are larger. Points on surfaces that cells are "
+        "filled with, and a second grid while one takes the place of another, come on top",
         items=MEMORY_ITEMS,
         default="512",
         update=changed,

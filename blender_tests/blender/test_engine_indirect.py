@@ -169,7 +169,7 @@ def test_only_what_the_method_reads_is_shown(indirect, method, expected):
     ("change", "gray"),
     [
         ({"unlimited_bounces": True}, {"bounces"}),
-        ({"cell_size": 0.5}, {"cells"}),
+        ({"cell_size": 0.5}, set()),
         ({"render": 0}, set()),
         ({"render": 0, "viewport": 0}, {"exit_surfaces"}),
     ],

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from addon.scene import Channel, LightKind
+from addon.scene import Sequence as Frames
 from addon.scene.versions import new_version
 from blender_tests import builders
+from blender_tests.gl.conftest import Session
 from blender_tests.indirect_scenes import (
     CORNELL_CAMERA,
     GRID,
@@ -114,30 +116,54 @@ def test_what_did_not_change_is_not_filled_again(shared_session):
     np.testing.assert_array_equal(kept[objects == FLOOR], expected[objects == FLOOR])
 
 
-def test_levels_grow_with_the_scene(shared_session, render):
+def test_levels_grow_with_the_scene(viewport):
     """A block leaves the room, and the levels cover more than before: the same picture as in a new grid, but for the
     rounding of positions that are counted from another corner."""
-    scene = room()
-    radiance(shared_session, scene, CORNELL_CAMERA, INDIRECT, samples=1)
-    scene = moved(scene, "block", builders.translation(0.0, -2.0, 0.6))
-    changed = radiance(shared_session, scene, CORNELL_CAMERA, INDIRECT, samples=1)
-    assert relative_difference(changed, new(render, scene, CORNELL_CAMERA, INDIRECT)) < ROUNDING
+    first = room()
+    second = moved(first, "block", builders.translation(0.0, -2.0, 0.6))
+    changed = viewport([(first, CORNELL_CAMERA), (second, CORNELL_CAMERA)], INDIRECT)
+    assert relative_difference(changed, viewport([(second, CORNELL_CAMERA)] * 2, INDIRECT)) < ROUNDING
 
 
-def test_cells_stay_where_the_levels_move(shared_session, render):
+def test_cells_stay_where_the_levels_move(viewport):
     """A walk along a floor that is larger than the levels: cells that come in are filled, others are kept."""
     floor = rectangle("floor", (0, 0, 0), (60, 0, 0), (0, 60, 0))
     blocks = [(block(f"block {x}", (2.0 * x, 1.0, 0.5), 0.5), WHITE) for x in range(-6, 7)]
     lamp = replace(LAMP, emission=(50.0, 50.0, 50.0))
     scene = of((floor, WHITE), *blocks, lights=(lamp,), world=(0.3, 0.4, 0.5))
     indirect = replace(INDIRECT, cells=32, cell_size=0.2)
-    for step in range(4):
-        camera = looking((3.0 * step, -4.0, 1.0), (3.0 * step, 0.0, 1.0))
-        walked = radiance(shared_session, scene, camera, indirect, samples=1)
-    assert relative_difference(walked, new(render, scene, camera, indirect)) < ROUNDING
+    walk = [(scene, looking((x, -4.0, 1.0), (x, 0.0, 1.0))) for x in (0.0, 3.0, 6.0, 9.0)]
+    assert relative_difference(viewport(walk, indirect), viewport(walk[-1:] * 4, indirect)) < ROUNDING
 
 
-def new(render, scene, camera, indirect):
-    """(48, 48, 3) as a renderer shows it that has seen nothing before."""
-    view = render(scene, camera, width=48, height=48, samples=1, indirect=indirect)
-    return view.channels[Channel.COMBINED][..., :3].astype(np.float64)
+@pytest.fixture(name="viewport")
+def viewport_fixture():
+    """viewport(pictures, indirect): the last of a new viewport's pictures of (scene, camera), (48, 48, 3)."""
+
+    def show(pictures, indirect):
+        session, indirect = Session(), replace(indirect, temporal_filter=False)
+        try:
+            for scene, camera in pictures:
+                shown = radiance(session, scene, camera, indirect, samples=1, sequence=Frames(continuous=True))
+            return shown
+        finally:
+            session.release()
+
+    return show
+
+
+def test_a_film_is_the_same_whatever_was_rendered_before(shared_session, render):
+    """To the bit, also where the levels moved: a frame in an animation is that frame alone."""
+    places = np.linspace(-30.0, 30.0, 61)
+    corners = np.stack([*np.meshgrid(places, places), np.zeros((61, 61))], axis=-1).reshape(-1, 3)
+    first = (np.arange(60)[:, None] * 61 + np.arange(60)).ravel()
+    triangles = np.concatenate([np.stack([first, first + b, first + c], axis=1) for b, c in ((1, 62), (62, 61))])
+    lamp = replace(LAMP, emission=(50.0, 50.0, 50.0))
+    scene = of((builders.mesh("floor", corners, triangles), WHITE), lights=(lamp,), world=(0.3, 0.4, 0.5))
+    scene = beside(scene, (block("block", (1.0, 0.0, 0.5), 0.5), WHITE))
+    indirect = replace(INDIRECT, cells=32, cell_size=0.2)
+    for x in (0.0, 5.0):
+        camera = looking((x, -4.0, 2.0), (x, 0.0, 0.0))
+        after = radiance(shared_session, scene, camera, indirect, samples=1)
+    alone = render(scene, camera, width=48, height=48, samples=1, indirect=indirect).channels[Channel.COMBINED]
+    np.testing.assert_array_equal(after, alone[..., :3])

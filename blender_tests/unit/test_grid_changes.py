@@ -8,7 +8,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from addon.render.grid.changes import Surfaces, changed_box, kept_cells, kept_marks, sources, world_box
+from addon.render.grid.changes import (
+    NOTHING_CHANGED,
+    Surfaces,
+    changed_boxes,
+    kept_cells,
+    kept_marks,
+    sources,
+    world_box,
+)
 from addon.render.grid.faces import ORIENTATIONS, number_faces
 from addon.render.grid.levels import GridLevel
 
@@ -42,22 +50,27 @@ def together(*parts):
     return replace(parts[0], **joined)
 
 
-def around(*boxes):
-    """The box around boxes (N, 2, 3); None where there are none."""
-    every = np.concatenate(boxes)
-    return np.stack([every[:, 0].min(axis=0), every[:, 1].max(axis=0)]) if len(every) else None
+def different(*boxes):
+    """Boxes (N, 2, 3) as a set; NaN is NaN."""
+    return {tuple(map(repr, box.ravel().tolist())) for box in np.concatenate(boxes)}
 
 
 def assert_changed(before, after, *boxes):
     """That these boxes are what changed, whichever of the two is first."""
-    for found in (changed_box(before, after), changed_box(after, before)):
-        np.testing.assert_equal(found, around(np.zeros((0, 2, 3)), *boxes))
+    for found in (changed_boxes(before, after), changed_boxes(after, before)):
+        assert different(found) == different(NOTHING_CHANGED, *boxes)
+
+
+def test_of_many_changes_the_box_around_them_is_told():
+    draw = any_surfaces(np.random.default_rng(1), 300)
+    found = changed_boxes({}, {"draw": draw})
+    np.testing.assert_array_equal(found, [[draw.boxes[:, 0].min(axis=0), draw.boxes[:, 1].max(axis=0)]])
 
 
 @FEW
 @given(COUNTS, COUNTS, COUNTS, COUNTS, SEEDS)
-def test_the_changed_box_is_around_what_moved_came_or_went(resting, moving, coming, going, seed):
-    """Of several instances, in any order; what moved is in it where it was and where it is."""
+def test_the_changed_boxes_are_those_of_what_moved_came_or_went(resting, moving, coming, going, seed):
+    """Of several instances, in any order; what moved is there where it was and where it is."""
     generator = np.random.default_rng(seed)
     every = any_surfaces(generator, resting + moving + coming + going)
     rest, moved, came, went = (
@@ -115,16 +128,19 @@ def any_level(generator, **arguments):
 
 
 def any_change(generator):
-    """A box somewhere near, as often as not on the border of a cell; or none, or everywhere."""
-    kind = generator.integers(0, 6)
-    if kind == 0:
-        return None
+    """A box somewhere near, as often as not on the border of a cell; or everywhere."""
+    kind = generator.integers(1, 6)
     if kind == 1:
         return np.array([[-inf] * 3, [inf] * 3])
     low = generator.uniform(-3.0, 3.0, 3)
     ends = np.stack([low, low + generator.uniform(0.0, 3.0, 3)])
     ends = np.rint(ends) if kind == 2 else ends
     return (ends + SHIFT) * 0.3
+
+
+def any_changes(generator):
+    """Up to three boxes (K, 2, 3)."""
+    return np.array([any_change(generator) for _ in range(generator.integers(0, 4))]).reshape(-1, 2, 3)
 
 
 def cells_of(level):
@@ -144,16 +160,16 @@ def kept_places(level, kept):
 @given(SEEDS)
 def test_cells_are_kept_that_both_levels_have_and_nothing_changed_in(seed):
     generator = np.random.default_rng(seed)
-    level, before, changed = any_level(generator), any_level(generator), any_change(generator)
+    level, before, changed = any_level(generator), any_level(generator), any_changes(generator)
     kept = kept_cells(level, before, changed)
     assert kept.shape == level.size[::-1]
     assert kept.dtype == np.bool_
     shared = cells_of(level).keys() & cells_of(before).keys()
     for place, index in cells_of(level).items():
         apart = inf  # cells from what changed, along the axis where it is farthest
-        if changed is not None:
-            ends = changed / level.cell - SHIFT
-            apart = np.maximum(ends[0] - np.add(place, 1), place - ends[1]).max()
+        for box in changed:
+            ends = box / level.cell - SHIFT
+            apart = min(apart, np.maximum(ends[0] - np.add(place, 1), place - ends[1]).max())
         if apart > 1.001 * ROUNDING or apart < 0.999 * ROUNDING:
             assert kept[index] == (place in shared and apart > ROUNDING)
 
@@ -162,30 +178,30 @@ def test_cells_are_kept_that_both_levels_have_and_nothing_changed_in(seed):
 @given(SEEDS)
 def test_the_cells_that_one_keeps_of_the_other_are_those_that_it_keeps_of_this(seed):
     generator = np.random.default_rng(seed)
-    first, second, changed = any_level(generator), any_level(generator), any_change(generator)
+    first, second, changed = any_level(generator), any_level(generator), any_changes(generator)
     here = kept_places(first, kept_cells(first, second, changed))
     assert here == kept_places(second, kept_cells(second, first, changed))
-    assert kept_cells(first, first, None).all()
+    assert kept_cells(first, first, NOTHING_CHANGED).all()
 
 
 @pytest.mark.parametrize("before", [None, {"cell": 0.30000001}, {"shift": (0.25, 0.4, 0.71)}])
 def test_nothing_is_kept_of_another_lattice(before):
     level = GridLevel((0, 0, 0), (3, 4, 5), 0.3, SHIFT)
     before = None if before is None else replace(level, **before)
-    assert not kept_cells(level, before, None).any()
-    assert before is None or not kept_cells(before, level, None).any()
+    assert not kept_cells(level, before, NOTHING_CHANGED).any()
+    assert before is None or not kept_cells(before, level, NOTHING_CHANGED).any()
 
 
 @pytest.mark.parametrize("ends", [(-1e30, 1e30), (-inf, inf), (nan, nan), (nan, 1e30), (-1e30, nan)])
 def test_nothing_is_kept_where_changes_are_everywhere_or_nobody_knows(ends):
     level = GridLevel((5, 5, 5), (3, 4, 5), 0.3, SHIFT)
-    assert not kept_cells(level, level, np.array([[ends[0]] * 3, [ends[1]] * 3])).any()
+    assert not kept_cells(level, level, np.array([[[ends[0]] * 3, [ends[1]] * 3]])).any()
 
 
 @pytest.mark.parametrize("far", [-1e30, -1e10, 1e10, 1e30, inf])
 def test_all_is_kept_where_changes_are_far_away(far):
     level = GridLevel((5, 5, 5), (3, 4, 5), 0.3, SHIFT)
-    assert kept_cells(level, level, np.full((2, 3), far)).all()
+    assert kept_cells(level, level, np.full((1, 2, 3), far)).all()
 
 
 @FEW

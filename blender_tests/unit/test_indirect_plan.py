@@ -13,6 +13,8 @@ from addon.render.indirect_plan import (
     INDIRECT_PASSES,
     IRRADIANCE_TARGET,
     ORIGIN_TARGET,
+    indirect_needs,
+    linking_warnings,
     reads_layers,
 )
 from addon.scene import (
@@ -269,3 +271,13 @@ def test_nothing_is_read_that_nobody_writes():
                 missing = {name for name in item.reads if name.startswith("indirect.")} - written
                 assert not missing, (method, item.name)
                 written |= {target.name for target in item.writes}
+
+
+@every_method
+def test_the_grid_says_which_linked_lights_it_takes_for_others(method):
+    """Their direct light is linked; what of it is reflected is not, where the grid finds it."""
+    lights = (builders.light(), replace(builders.light(), key="rim", name="Rim", receiver_groups=1))
+    scene = replace(EVERYTHING, lights=lights)
+    settings = RenderSettings(64, 64, indirect=IndirectSettings(method))
+    found = linking_warnings(scene, indirect_needs(scene, settings, []))
+    assert [("Rim" in sentence) for sentence in found] == [True] * (method is IndirectMethod.MARCH_GRID)

@@ -77,10 +77,7 @@ void main()
         luminances += hit.hit ? vec2(brightness, 0.0) : vec2(0.0, brightness);
     }
     float share = 1.0 / float(max(rays, 1));
-    float mean = luminance(sum) * share;
-    // Of the mean of independent rays; of a single one nothing is known but its own square.
-    float variance = max(squares * share - (rays > 1 ? mean * mean : 0.0), 0.0) / float(max(rays - 1, 1));
-    out_irradiance = noisy_irradiance(sum * (PI * share), PI * sqrt(variance));
+    out_irradiance = noisy_irradiance(sum * (PI * share), PI * mean_deviation(luminance(sum), squares, rays));
 #if defined(DEBUG_MARCH_HITS)
     out_origin = vec4(vec3(float(hits) * share), 1.0);
 #elif defined(DEBUG_LIGHT_ORIGIN)

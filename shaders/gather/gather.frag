@@ -6,6 +6,7 @@
 #include "common/finite.glsl"
 #include "common/hash.glsl"
 #include "common/layer_radiance.glsl"
+#include "common/noisy_irradiance.glsl"
 #include "common/octahedral.glsl"
 #include "generated/GatherUniforms.glsl"
 #include "common/environment.glsl"
@@ -31,8 +32,6 @@ layout(location = 0) out vec4 out_gathered; // irradiance, W/m², and the varian
 #define SHOWN
 layout(location = 1) out vec4 out_origin;
 #endif
-
-const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722); // of linear Rec. 709
 
 /** The finest level that holds a position, the coarsest where none does. */
 int level_at(vec3 position)
@@ -144,15 +143,12 @@ void main()
             }
         }
         radiance = finite_radiance(radiance);
-        float luminance = dot(radiance, LUMINANCE);
+        float brightness = luminance(radiance);
         sum += radiance;
-        sum_of_squares += luminance * luminance;
+        sum_of_squares += brightness * brightness;
     }
     float count = float(gather_rays);
-    vec3 mean = sum / count;
-    float luminance = dot(mean, LUMINANCE);
-    float variance = max(sum_of_squares / count - luminance * luminance, 0.0) / max(count - 1.0, 1.0);
-    out_gathered = vec4(PI * mean, PI * PI * variance);
+    out_gathered = noisy_irradiance(sum * (PI / count), PI * mean_deviation(luminance(sum), sum_of_squares, gather_rays));
 #if defined(DEBUG_MARCH_HITS)
     out_origin = vec4(vec3(marched / count), 1.0);
 #elif defined(DEBUG_LIGHT_ORIGIN)

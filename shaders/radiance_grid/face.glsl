@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The face that a fragment stands for. Uniforms: FACE_UNIFORMS in render/grid/radiance.py.
+// The face that a fragment stands for. Uniforms: FACE_UNIFORMS in render/grid/textures.py.
 
 #include "generated/FaceUniforms.glsl"
 #include "common/radiance_grid.glsl"

@@ -14,14 +14,16 @@ uniform usampler2DArray links_before;
 layout(location = 0) out uint out_link; // the face that was met plus 1, 0 for none
 
 #ifdef KEPT
-/** Distance along a ray to where it enters the box of what changed, m; infinite where it does not. */
+const float NEVER = 1e30;
+
+/** Distance along a ray to where it enters the box of what changed, m; NEVER where it does not. */
 float distance_to_change(vec3 origin, vec3 direction)
 {
     vec3 slow = mix(direction, vec3(1e-20), equal(direction, vec3(0.0)));
     vec3 one = (changed_low.xyz - origin) / slow, two = (changed_high.xyz - origin) / slow;
     vec3 enter = min(one, two), leave = max(one, two);
     float start = max(max(enter.x, enter.y), max(enter.z, 0.0)), end = min(leave.x, min(leave.y, leave.z));
-    return start <= end ? start : 1.0 / 0.0;
+    return start <= end ? start : NEVER;
 }
 
 /** The link that a ray of a face had before, for the faces as they are numbered now; false where it may be another. */
@@ -34,7 +36,7 @@ bool kept_link(int face, vec3 origin, vec3 direction, out uint link)
     uint met = texelFetch(links_before, ivec3(face_texel(int(source) - 1), ray), 0).r;
     float change = distance_to_change(origin, direction);
     if (met == 0u)
-        return isinf(change);
+        return change >= NEVER;
     link = texelFetch(face_moved, face_texel(int(met) - 1), 0).r;
     if (link == 0u)
         return false;

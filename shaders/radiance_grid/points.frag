@@ -57,6 +57,7 @@ void main()
 #ifdef ATTRIBUTE
     base_color *= color;
 #endif
+    base_color *= 1.0 - material_surface.x; // what is reflected diffusely
     vec3 front = vec3(0.0), back = vec3(0.0);
 #ifdef EMISSION
     front = glow.x * finite_radiance(material_emission.rgb);

@@ -79,7 +79,8 @@ void main()
 #else
     uint entry = texelFetch(grid_cells, cell + ivec3(0, 0, int(level_size.w)), 0).r;
     int index = face_of(entry, orientation);
-    within = within && texelFetch(face_sources, face_texel(index), 0).r == 0u;
+    within = within && (entry >> uint(orientation) & 1u) != 0u;
+    within = within && texelFetch(face_sources, face_texel(within ? index : 0), 0).r == 0u;
 #endif
     gl_Position = within ? at_texel(index) : NOWHERE;
 #ifdef TEXTURE

@@ -15,7 +15,7 @@ vec3 ray_direction(Face face, uvec2 place, int ray)
 {
     const float GOLDEN = 0.6180339887498949;
     vec2 lattice = vec2((float(ray) + 0.5) / float(ray_count), float(ray) * GOLDEN);
-    vec2 u = fract(lattice + hash_to_unit(place) + ray_shift);
+    vec2 u = fract(lattice + hash_to_unit(place));
     vec3 tangent, bitangent;
     orthonormal_basis(face.normal, tangent, bitangent);
     float radius = sqrt(u.x), angle = 2.0 * PI * u.y;

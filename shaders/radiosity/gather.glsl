@@ -16,8 +16,6 @@ uniform sampler2DArray base_color_layers;
 uniform sampler2DArray material_layers;
 uniform sampler2DArray bounced_layers; // a texel for BOUNCE_DIVISOR² pixels
 #endif
-#ifdef RADIANCE
-#endif
 
 // Exponent of the offset, pixels, up to which taps are not subsampled, less one.
 const int RADIOSITY_FINEST = 4;

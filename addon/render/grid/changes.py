@@ -13,6 +13,11 @@ from .levels import GridLevel
 _ROUNDING = 0.01
 """Cells by which changed surfaces may be elsewhere for the GPU's float32."""
 
+_MOST_BOXES = 256
+"""Of more changes, what lies between them counts as changed, too."""
+
+NOTHING_CHANGED = np.zeros((0, 2, 3))
+
 _FARTHEST = 2.0**40
 """Cells from the world's origin that are told apart."""
 
@@ -31,8 +36,8 @@ class Surfaces:
     boxes: Float64Array
 
 
-def changed_box(before: Mapping[Hashable, Surfaces], after: Mapping[Hashable, Surfaces]) -> Float64Array | None:
-    """(2, 3) box in world space around all instances that came, went or look otherwise than before; None where none."""
+def changed_boxes(before: Mapping[Hashable, Surfaces], after: Mapping[Hashable, Surfaces]) -> Float64Array:
+    """(K, 2, 3) boxes in world space around all instances that came, went or look otherwise than before."""
     boxes: list[Float64Array] = []
     for key in before.keys() | after.keys():
         old, new = before.get(key), after.get(key)
@@ -41,8 +46,13 @@ def changed_box(before: Mapping[Hashable, Surfaces], after: Mapping[Hashable, Su
         else:
             kept = _at_rest(old, new), _at_rest(new, old)
             boxes += [surfaces.boxes[~rests] for surfaces, rests in zip((old, new), kept, strict=True)]
-    changed = np.concatenate([np.zeros((0, 2, 3)), *boxes])
-    return np.stack([changed[:, 0].min(axis=0), changed[:, 1].max(axis=0)]) if len(changed) else None
+    changed = np.concatenate([NOTHING_CHANGED, *boxes])
+    return changed if len(changed) <= _MOST_BOXES else box_around(changed)[None]
+
+
+def box_around(boxes: Float64Array) -> Float64Array:
+    """(2, 3) the box around boxes (K, 2, 3), at least one."""
+    return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
 
 def _at_rest(surfaces: Surfaces, other: Surfaces) -> BoolArray:
@@ -55,15 +65,16 @@ def _at_rest(surfaces: Surfaces, other: Surfaces) -> BoolArray:
     return (other.ids[rows] == surfaces.ids) & (other.matrices[rows] == surfaces.matrices).all(axis=(1, 2))
 
 
-def kept_cells(level: GridLevel, before: GridLevel | None, changed: Float64Array | None) -> BoolArray:
-    """(D, H, W) which cells of a level hold what they held `before`; all that changed is in a box, world space."""
+def kept_cells(level: GridLevel, before: GridLevel | None, changed: Float64Array) -> BoolArray:
+    """(D, H, W) which cells of a level hold what they held `before`; all that `changed` is in boxes (K, 2, 3), world
+    space."""
     kept = np.zeros(level.size[::-1], np.bool_)
     if before is None or (level.cell, level.shift) != (before.cell, before.shift):
         return kept
     start = np.array(before.lowest, np.int64) - level.lowest
     kept[_cells(start, start + before.size, level)] = True
-    if changed is not None:
-        ends = changed / level.cell - level.shift + np.array([[-_ROUNDING], [_ROUNDING]])
+    for box in changed:
+        ends = box / level.cell - level.shift + np.array([[-_ROUNDING], [_ROUNDING]])
         ends = np.where(np.isnan(ends), [[-_FARTHEST], [_FARTHEST]], ends)  # what is nobody knows where may be anywhere
         cells = np.floor(np.clip(ends, -_FARTHEST, _FARTHEST)).astype(np.int64) - level.lowest
         kept[_cells(cells[0], cells[1] + 1, level)] = False

@@ -23,7 +23,7 @@ from ..passes.base import Frame, UniformBuffer
 from ..passes.rasterize import SURFACES
 from ..programs import ProgramSpec
 from ..uniforms import UniformBlock
-from .changes import kept_cells, kept_marks, sources, world_box
+from .changes import NOTHING_CHANGED, kept_cells, kept_marks, sources, world_box
 from .contents import unsampled_emission
 from .faces import ORIENTATIONS, number_faces
 from .levels import GridLevel
@@ -76,19 +76,16 @@ class GridFill:
         frame: Frame,
         levels: tuple[GridLevel, ...],
         before: GridTextures | None = None,
-        changed: Float64Array | None = None,
+        changed: Float64Array = NOTHING_CHANGED,
     ) -> GridTextures:
         """The surfaces of a frame's scene in these levels.
 
-        `before`: an earlier grid, of a scene that differs from this one only in a box, `changed` (2, 3), world space,
-        or nowhere. Cells that both have outside of that are taken from there.
+        `before`: an earlier grid, of a scene that differs from this one only in boxes, `changed` (K, 2, 3), world
+        space. Cells that both have outside of that are taken from there.
         Raises RenderError where memory does not suffice.
         """
         kept = _kept(levels, before, changed)
-        places = [
-            _Place(level, sum(below.size[2] for below in levels[:number]), world_box(~cells, level))
-            for number, (level, cells) in enumerate(zip(levels, kept, strict=True))
-        ]
+        places = _places(frame, levels, kept)
         marks: list[UInt8Array] = []
         for number, (place, cells) in enumerate(zip(places, kept, strict=True)):
             there = self._occupied(frame, place)
@@ -98,11 +95,15 @@ class GridFill:
             marks.append(there)
         faces = number_faces(levels, tuple(marks))
         textures = GridTextures(self._device, levels, faces, frame.settings.indirect.cell_rays)
-        if before is not None:
-            textures.take_from(sources(faces, kept, before.faces, _kept(before.levels, textures, changed)))
-        self._add_up(frame, textures, places, before)
-        self._find_planes(textures)
-        self._points.keep(frame.scene, frame.draws.of(frame.scene).draws, levels)
+        try:
+            if before is not None:
+                textures.take_from(sources(faces, kept, before.faces, _kept(before.levels, textures, changed)))
+            self._add_up(frame, textures, places, before)
+            self._find_planes(textures)
+        except BaseException:
+            textures.release()
+            raise
+        self._points.tidy(frame.scene)
         return textures
 
     def release(self) -> None:
@@ -113,7 +114,7 @@ class GridFill:
     def _occupied(self, frame: Frame, place: "_Place") -> UInt8Array:
         """(6 · cells,) not 0 where a level has a face, as far as its place is not kept."""
         count = ORIENTATIONS * place.level.count
-        if place.filled is None:
+        if not place.draws:
             return np.zeros(count, np.uint8)
         size = (_OCCUPANCY_WIDTH, -(-count // _OCCUPANCY_WIDTH))
         texture = self._device.context.texture(size, 1, dtype="f1")
@@ -123,7 +124,7 @@ class GridFill:
             framebuffer.use()
             framebuffer.clear()
             self._device.context.enable_only(moderngl.NOTHING)
-            for draw in place.draws(frame):
+            for draw in place.draws:
                 self._draw(frame, draw, place, "OCCUPANCY", size)
             self._device.context.finish()
             marks = np.frombuffer(framebuffer.read(components=1, alignment=1), np.uint8)[:count].reshape(-1, 2)
@@ -151,12 +152,14 @@ class GridFill:
         context.blend_func = moderngl.ONE, moderngl.ONE
         for index in range(len(GREATEST)):
             self._device.raw.blend_greatest(len(ADDED_UP) + index)
-        for place in places:
-            for draw in place.draws(frame):
-                glow = unsampled_emission(frame.scene, draw, sampled)
-                self._draw(frame, draw, place, "", framebuffer.size, glow, textures)
-        self._device.raw.blend_sum()
-        context.enable_only(moderngl.NOTHING)
+        try:
+            for place in places:
+                for draw in place.draws:
+                    glow = unsampled_emission(frame.scene, draw, sampled)
+                    self._draw(frame, draw, place, "", framebuffer.size, glow, textures)
+        finally:
+            self._device.raw.blend_sum()
+            context.enable_only(moderngl.NOTHING)
 
     def _keep_sums(self, textures: GridTextures, before: GridTextures) -> None:
         """Take the sums of kept faces from an earlier grid."""
@@ -207,11 +210,11 @@ class GridFill:
             level_size=(*level.size, place.bottom),
             target_size=size,
             level_cell=level.cell,
-            point_area=min(points.points.area, float(np.finfo(np.float32).max)),
-            point_spacing=sqrt(points.points.area),
+            point_area=min(points.area, float(np.finfo(np.float32).max)),
+            point_spacing=sqrt(points.area),
             alpha_threshold=frame.settings.alpha_threshold,
         )
-        vertex_array.render(moderngl.POINTS, vertices=points.points.count, instances=draw.batch.count)
+        vertex_array.render(moderngl.POINTS, vertices=points.count, instances=draw.batch.count)
         self._device.context.clear_samplers()
         vertex_array.release()
         if glow_buffer is not None:
@@ -229,26 +232,32 @@ class GridFill:
 
 @dataclass(frozen=True)
 class _Place:
-    """A level, how far up its cells are in the table, and the box (2, 3) in world space around what of it is filled."""
+    """A level, how far up its cells are in the table, and the draws that have something where it is filled."""
 
     level: GridLevel
     bottom: int
-    filled: Float64Array | None
-
-    def draws(self, frame: Frame) -> Iterator[Draw]:
-        """The draws that have something there."""
-        if self.filled is None:
-            return
-        margin = 0.5 * self.level.cell
-        for draw in frame.draws.of(frame.scene).draws:
-            low, high = batch_bounds(frame.scene.meshes[draw.batch.mesh], draw.batch)
-            if (low <= self.filled[1] + margin).all() and (high >= self.filled[0] - margin).all():
-                yield draw
+    draws: tuple[Draw, ...]
 
 
-def _kept(
-    levels: tuple[GridLevel, ...], other: GridTextures | None, changed: Float64Array | None
-) -> tuple[BoolArray, ...]:
+def _places(frame: Frame, levels: tuple[GridLevel, ...], kept: tuple[BoolArray, ...]) -> list[_Place]:
+    """Where the levels are filled: wherever they are not kept."""
+    scene, draws = frame.scene, frame.draws.of(frame.scene).draws
+    boxes = np.array([batch_bounds(scene.meshes[draw.batch.mesh], draw.batch) for draw in draws]).reshape(-1, 2, 3)
+    places: list[_Place] = []
+    bottom = 0
+    for level, cells in zip(levels, kept, strict=True):
+        filled = world_box(~cells, level)
+        there: tuple[Draw, ...] = ()
+        if filled is not None:
+            low, high = filled[0] - 0.5 * level.cell, filled[1] + 0.5 * level.cell
+            touches = ((boxes[:, 0] <= high) & (boxes[:, 1] >= low)).all(axis=1)
+            there = tuple(draws[index] for index in np.flatnonzero(touches).tolist())
+        places.append(_Place(level, bottom, there))
+        bottom += level.size[2]
+    return places
+
+
+def _kept(levels: tuple[GridLevel, ...], other: GridTextures | None, changed: Float64Array) -> tuple[BoolArray, ...]:
     """Per level (D, H, W) which cells hold what another grid's do."""
     others = () if other is None else other.levels
     return tuple(kept_cells(*pair, changed) for pair in zip_longest(levels, others[: len(levels)]))

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The points of the scene's meshes on the GPU, for as long as what they lie on is there."""
 
-from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
 from math import ceil, log2
 
@@ -19,12 +18,16 @@ _DENSITIES_PER_OCTAVE = 32
 _ROUNDING = 1e-3
 """Steps: what float32 makes of a turned matrix (1e-7, times the steps per octave) must not be another density."""
 
+_Key = tuple[str, int, int, float, bytes | None]
+"""Mesh, its version, where its slot begins, points per m², and what of object space they are from."""
+
 
 @dataclass
 class PointBuffers:
-    """Points of one slot of a mesh on the GPU, and what moderngl binds them as."""
+    """Points of one slot of a mesh on the GPU, and what moderngl binds them as. `area` (m²): what each stands for."""
 
-    points: SurfacePoints
+    count: int
+    area: float
     attributes: list[tuple[moderngl.Buffer, str, str]]
 
     def release(self) -> None:
@@ -38,24 +41,29 @@ class PointCache:
 
     def __init__(self, device: Device) -> None:
         self._device = device
-        self._held: dict[Hashable, PointBuffers] = {}
+        self._held: dict[_Key, PointBuffers] = {}
+        self._used: set[_Key] = set()
 
     def of(self, scene: Scene, draw: Draw, level: GridLevel) -> PointBuffers | None:
         """Points that are dense enough for a level; None where there are none."""
         key = _key(scene, draw, level)
+        self._used.add(key)
         if key not in self._held:
             mesh = scene.meshes[draw.batch.mesh]
             slot = next(slot for slot in mesh.slots if 3 * slot.first == draw.first_index)
             box = _object_box(mesh, draw.batch.matrices, level)
             self._held[key] = self._upload(surface_points(mesh, slot, _density(draw, level), box))
         points = self._held[key]
-        return points if points.points.count else None
+        return points if points.count else None
 
-    def keep(self, scene: Scene, draws: Iterable[Draw], levels: tuple[GridLevel, ...]) -> None:
-        """Free the points of all but these."""
-        used = {_key(scene, draw, level) for draw in draws for level in levels}
-        for key in self._held.keys() - used:
-            self._held.pop(key).release()
+    def tidy(self, scene: Scene) -> None:
+        """Free the points of meshes that are gone, and of those that were asked for since the last time all others."""
+        slots = {(mesh.key, mesh.version, 3 * slot.first) for mesh in scene.meshes.values() for slot in mesh.slots}
+        asked = {key[:3] for key in self._used}
+        for key in [key for key in self._held if key not in self._used]:
+            if key[:3] in asked or key[:3] not in slots:
+                self._held.pop(key).release()
+        self._used = set()
 
     def release(self) -> None:
         """Free everything."""
@@ -74,17 +82,19 @@ class PointCache:
             (points.reaches[:, 1], "4f1", "in_reach_high"),
         )
         if points.count == 0:
-            return PointBuffers(points, [])
+            return PointBuffers(0, 0.0, [])
         context = self._device.context
         held = [
             (context.buffer(np.ascontiguousarray(array)), layout, name)
             for array, layout, name in arrays
             if array is not None
         ]
-        return PointBuffers(points, held)
+        size = sum(buffer.size for buffer, _, _ in held)
+        self._device.check_upload("points for the radiance grid", size)
+        return PointBuffers(points.count, points.area, held)
 
 
-def _key(scene: Scene, draw: Draw, level: GridLevel) -> Hashable:
+def _key(scene: Scene, draw: Draw, level: GridLevel) -> _Key:
     mesh = scene.meshes[draw.batch.mesh]
     box = _object_box(mesh, draw.batch.matrices, level)
     return mesh.key, mesh.version, draw.first_index, _density(draw, level), None if box is None else box.tobytes()

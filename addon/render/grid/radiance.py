@@ -28,6 +28,7 @@ from ..programs import ProgramSpec
 from ..receivers import MOST_TILES, Receivers
 from ..sampling import film_sample
 from ..uniforms import UniformBlock
+from .changes import NOTHING_CHANGED, box_around
 from .textures import FACE_UNIFORMS, FaceDraw, GridTextures, face_program, face_uniforms
 
 CHANGE_UNIFORMS = UniformBlock(
@@ -104,14 +105,14 @@ class GridRadiance:
         frame: Frame,
         grid: GridTextures,
         before: GridTextures | None = None,
-        changed: Float64Array | None = None,
+        changed: Float64Array = NOTHING_CHANGED,
     ) -> None:
         """Find which faces the rays of the coarse faces meet.
 
         `before`: the grid that this one was filled from. Where that has the same levels, its rays are kept that come
-        from kept cells to kept cells and stay out of what `changed` (2, 3).
+        from kept cells to kept cells and stay out of the box around what `changed` (K, 2, 3).
         """
-        if before is None or changed is None or before.levels != grid.levels:
+        if before is None or len(changed) == 0 or before.levels != grid.levels:
             spec = self._links.spec("radiance_grid/links.frag", _DEFINES, _FACE_SAMPLERS)
             self._draw_links(frame, grid, spec, np.zeros((2, 3)))
             return
@@ -120,8 +121,11 @@ class GridRadiance:
         grid.sources.use(spec.samplers.index("face_sources"))
         moved.use(spec.samplers.index("face_moved"))
         before.links.use(spec.samplers.index("links_before"))
-        self._draw_links(frame, grid, spec, _cells_around(changed, grid.levels[-1].cell) - frame.view.position)
-        moved.release()
+        around = _cells_around(box_around(changed), grid.levels[-1].cell)
+        try:
+            self._draw_links(frame, grid, spec, around - frame.view.position)
+        finally:
+            moved.release()
 
     def meet_first(self, frame: Frame, grid: GridTextures) -> None:
         """Find the coarse faces' irradiance by emission and by the world."""

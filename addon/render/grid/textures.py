@@ -29,7 +29,6 @@ FACE_UNIFORMS = UniformBlock(
     "FaceUniforms",
     (
         *GRID_UNIFORMS,
-        ("ray_shift", "vec2"),  # of all rays' random numbers
         ("share", "float"),  # of what is added up
         ("first_face", "int"),  # of those that are drawn
         ("end_face", "int"),  # the one after the last
@@ -204,13 +203,11 @@ def face_uniforms(
     *,
     ray: int = 0,
     ray_count: int = 0,
-    ray_shift: tuple[float, float] = (0.0, 0.0),
     share: float = 1.0,
 ) -> dict[str, object]:
     """Values of `FACE_UNIFORMS` to draw faces `faces[0]` … `faces[1] − 1`."""
     return {
         **grid_uniforms(levels, origin),
-        "ray_shift": ray_shift,
         "share": share,
         "first_face": faces[0],
         "end_face": faces[1],

@@ -49,10 +49,11 @@ class GridFitting:
     """Fits grids to views; what it finds out about meshes is kept."""
 
     def __init__(self) -> None:
-        self._areas: dict[Hashable, float] = {}
+        self._areas: dict[Hashable, Float64Array] = {}
+        self._before: tuple[IndirectSettings, float] | None = None
 
-    def fit(self, frame: Frame, before: float | None) -> GridView:
-        """The grid that a view needs. `before` (m): cells of the view before it in a viewport."""
+    def fit(self, frame: Frame) -> GridView:
+        """The grid that a view needs. A viewport with the settings of the view before keeps cells that nearly fit."""
         scene, indirect = frame.scene, frame.settings.indirect
         boxes, areas = self._surface(scene)
         bounds = np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
@@ -63,8 +64,12 @@ class GridFitting:
         view = GridView(bounds, seen.mean(axis=0), cell)
         while _is_costly(view.levels(indirect, 0), indirect, boxes, areas):
             view = GridView(bounds, view.center, COARSER * view.cell)
-        if before is not None and not indirect.cell_size and 1.0 / _SAME_CELLS <= before / view.cell <= _SAME_CELLS:
-            view = GridView(bounds, view.center, before)
+        if frame.continuous and self._before is not None and self._before[0] == indirect and not indirect.cell_size:
+            same = GridView(bounds, view.center, self._before[1])
+            nearly = 1.0 / _SAME_CELLS <= same.cell / view.cell <= _SAME_CELLS
+            if nearly and not _is_costly(same.levels(indirect, 0), indirect, boxes, areas):
+                view = same
+        self._before = indirect, view.cell
         return view
 
     def _surface(self, scene: Scene) -> tuple[Float64Array, Float64Array]:
@@ -76,10 +81,9 @@ class GridFitting:
             mesh = scene.meshes[batch.mesh]
             key = mesh.key, mesh.version
             if key not in self._areas:
-                self._areas[key] = held[key] if key in held else _area(mesh)
-            scales = np.abs(np.linalg.det(batch.matrices[:, :3, :3])) ** (2.0 / 3.0)
+                self._areas[key] = held[key] if key in held else _areas_across(mesh)
             boxes.append(instance_bounds(mesh, batch))
-            areas.append(self._areas[key] * scales)
+            areas.append(_placed_areas(self._areas[key], batch.matrices))
         if sum(map(len, areas)) == 0:
             return np.zeros((1, 2, 3)), np.zeros(1)
         return np.nan_to_num(np.concatenate(boxes)), np.nan_to_num(np.concatenate(areas))
@@ -96,10 +100,20 @@ def _is_costly(
     return not indirect.cell_size and expected_faces(levels[1:], boxes, areas) > most
 
 
-def _area(mesh: Mesh) -> float:
-    """Area of a mesh's triangles, m² of object space."""
+def _placed_areas(area: Float64Array, matrices: Float64Array) -> Float64Array:
+    """(N,) about how much surface (m²) instances have: `area` (3,), shared among the axes, times what the matrices
+    (N, 4, 4) make of squares across each."""
+    x, y, z = (matrices[:, :3, axis] for axis in range(3))
+    scales = [np.linalg.norm(np.cross(*across), axis=1) for across in ((y, z), (z, x), (x, y))]
+    return np.stack(scales, axis=1) @ area
+
+
+def _areas_across(mesh: Mesh) -> Float64Array:
+    """(3,) area of a mesh's triangles, m² of object space, shared among the axes as their normals point along them."""
     a, b, c = (mesh.positions[mesh.triangles[:, corner]].astype(np.float64) for corner in range(3))
-    return 0.5 * float(np.sqrt((np.cross(b - a, c - a) ** 2).sum(axis=1)).sum())
+    across = np.cross(b - a, c - a)
+    shares = np.abs(across).sum(axis=0)
+    return 0.5 * np.sqrt((across**2).sum(axis=1)).sum() * shares / max(shares.sum(), 1e-300)
 
 
 def _seen_box(frame: Frame) -> Float64Array | None:
