@@ -6,12 +6,16 @@ from __future__ import annotations
 import json
 import os
 import subprocess
+import sys
 import tempfile
 from argparse import Namespace
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import IO
 
 from tooling import blender_window, environments, places
 from tooling.console import ToolError, say, warn
@@ -51,9 +55,9 @@ def test(options: Namespace) -> int:
     missing: list[str] = []
     inside = [kind for kind in kinds if kind not in {"gui", "report"} and has_tests(places.TESTS / kind)]
     if inside:
-        for version in versions(options.blender, missing):
-            python = partial(environments.blender_python, version)
-            outcomes[f"Blender {version}"] = run_in(python, f"Blender {version}", inside, options.arguments)
+        here = versions(options.blender, missing)
+        providers = {f"Blender {version}": partial(environments.blender_python, version) for version in here}
+        outcomes |= run_together(providers, inside, options.arguments)
     if "report" in kinds and has_tests(places.TESTS / "report"):
         outcomes["report"] = run_in(environments.development_python, "report", ["report"], options.arguments)
     if "gui" in kinds and has_tests(places.TESTS / "gui"):
@@ -89,12 +93,38 @@ def no_window() -> str:
 
 def run_in(provide: Callable[[], Path], label: str, kinds: Iterable[str], arguments: list[str]) -> Outcome:
     """Run the tests in the interpreter that `provide` sets up; one that cannot be set up counts as a failure."""
-    try:
-        python = provide()
-    except ToolError as error:
-        warn(f"error: {error}")
-        return Outcome(1, failed=1)
-    return run_pytest(python, label, kinds, arguments)
+    return run_together({label: provide}, kinds, arguments)[label]
+
+
+def run_together(
+    providers: Mapping[str, Callable[[], Path]], kinds: Iterable[str], arguments: list[str]
+) -> dict[str, Outcome]:
+    """Run the tests in several interpreters, by label, at the same time: much of a suite uses one core only.
+
+    What the first prints is seen at once, that of the others when those before them are over. Interpreters are set up
+    one after another; one that cannot be counts as a failure.
+    """
+    outcomes: dict[str, Outcome] = {}
+    runs: list[tuple[str, Future[Outcome], IO[bytes] | None]] = []
+    with ThreadPoolExecutor(max_workers=len(providers) or 1) as pool, ExitStack() as files:
+        pythons: dict[str, Path] = {}
+        for label, provide in providers.items():
+            try:
+                pythons[label] = provide()
+            except ToolError as error:
+                warn(f"error: {error}")
+                outcomes[label] = Outcome(1, failed=1)
+        for label, python in pythons.items():
+            held = files.enter_context(tempfile.TemporaryFile()) if runs else None
+            runs.append((label, pool.submit(run_pytest, python, kinds, arguments, held), held))
+        for label, run, held in runs:
+            say(f"== tests: {label} ({', '.join(kinds)})")
+            outcomes[label] = run.result()
+            if held is not None:
+                held.seek(0)
+                sys.stdout.write(held.read().decode(errors="replace"))
+                sys.stdout.flush()
+    return outcomes
 
 
 def has_tests(folder: Path) -> bool:
@@ -117,15 +147,21 @@ def versions(chosen: str | None, missing: list[str]) -> list[str]:
     return [blender.version for blender in here]
 
 
-def run_pytest(python: Path, label: str, kinds: Iterable[str], arguments: list[str]) -> Outcome:
-    """Run these kinds of tests with pytest, on the software rasteriser and with a scratch Blender profile."""
-    say(f"== tests: {label} ({', '.join(kinds)})")
+def run_pytest(python: Path, kinds: Iterable[str], arguments: list[str], output: IO[bytes] | None) -> Outcome:
+    """Run these kinds of tests with pytest, on the software rasteriser and with a scratch Blender profile.
+
+    `output`: a file that gets what it prints, in place of the terminal.
+    """
     folders = [str(places.TESTS / kind) for kind in kinds]
     with tempfile.TemporaryDirectory(prefix="deep_gbuffer_test_") as scratch:
         counts = Path(scratch) / "counts.json"
         surroundings = {**os.environ, "LIBGL_ALWAYS_SOFTWARE": "1", "BLENDER_USER_RESOURCES": scratch}
         command = [str(python), "-P", "-c", PYTEST, str(counts), *folders, *arguments]
-        code = subprocess.run(command, cwd=places.REPOSITORY, env=surroundings, check=False).returncode
+        errors = None if output is None else subprocess.STDOUT
+        run = subprocess.run(
+            command, cwd=places.REPOSITORY, env=surroundings, stdout=output, stderr=errors, check=False
+        )
+        code = run.returncode
         return outcome_of(code, json.loads(counts.read_text(encoding="utf-8")) if counts.is_file() else {})
 
 

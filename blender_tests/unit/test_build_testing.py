@@ -125,5 +125,27 @@ def test_an_environment_that_cannot_be_made_is_a_failure_with_its_reason(tests_i
     assert "the package index is away" in errors
 
 
+def test_versions_run_at_the_same_time_and_print_one_after_another(tests_in, capfd, monkeypatch):
+    """Each waits for the other to have begun."""
+    meeting = """
+import os, pathlib, time
+def test_meets():
+    here = pathlib.Path(__file__).parent
+    (here / str(os.getpid())).touch()
+    end = time.monotonic() + 60.0
+    while len(list(here.glob("[0-9]*"))) < 2 and time.monotonic() < end:
+        os.sched_yield()
+    print("seen", len(list(here.glob("[0-9]*"))))
+    assert len(list(here.glob("[0-9]*"))) == 2
+"""
+    tests_in(unit=meeting)
+    monkeypatch.setattr(testing, "versions", lambda _chosen, _missing: ["4.5", "5.2"])
+    assert run() == 0
+    output = capfd.readouterr().out
+    first, second = output.index("== tests: Blender 4.5"), output.index("== tests: Blender 5.2")
+    assert first < output.index("1 passed") < second < output.rindex("1 passed in")
+    assert output.splitlines()[-1] == "2 passed, 0 failed, 0 skipped"
+
+
 def test_unexpected_passes_count_as_passed():
     assert testing.outcome_of(0, {"passed": 2, "xpassed": 1, "skipped": 1, "": 9}) == Outcome(0, 3, 0, 1)
