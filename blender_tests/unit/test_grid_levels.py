@@ -69,14 +69,14 @@ def test_a_level_is_the_box_that_its_cells_fill():
 
 @FEW
 @given(st.floats(1e-30, 1e30), CELLS, st.integers(0, 2), st.floats(0.0, 1.0))
-def test_as_many_cells_are_along_the_longest_side_in_quarters_of_octaves(side, cells, axis, share):
+def test_as_many_cells_are_along_the_longest_side_in_sixteenths_of_octaves(side, cells, axis, share):
     seen = np.zeros((2, 3))
     seen[0] = -0.25 * share * side
     seen[1] = 0.75 * share * side
     seen[:, axis] = 0.0, side
     cell = cell_size(seen, cells)
     assert side / cells * (1.0 - 1e-12) <= cell <= side / cells * COARSER * (1.0 + 1e-12)
-    assert 4.0 * log2(cell) == pytest.approx(round(4.0 * log2(cell)), abs=1e-9)
+    assert 16.0 * log2(cell) == pytest.approx(round(16.0 * log2(cell)), abs=1e-9)
 
 
 @pytest.mark.parametrize("high", [0.0, -1.0, nan, inf])
@@ -149,7 +149,7 @@ def test_cells_are_no_larger_than_the_memory_asks_for(seed, cells, power):
 
     levels = grid_levels(bounds, center, cell, cells, memory)
     assert BYTES_PER_CELL * sum(level.count for level in levels) <= memory
-    steps = round(4.0 * log2(levels[0].cell / cell))
+    steps = round(log2(levels[0].cell / cell) / log2(COARSER))
     tried = [cell]
     for _ in range(steps):
         tried.append(tried[-1] * COARSER)

@@ -47,6 +47,18 @@ def points_of(mesh, density, box=None):
     return surface_points(mesh, mesh.slots[0], density, None if box is None else np.array(box, np.float64))
 
 
+def points_inside(mesh, density, box=None):
+    """Points on a mesh's first slot without those along edges."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(grid_points, "_MOST_ON_EDGES", 0.0)
+        return points_of(mesh, density, box)
+
+
+def surface_of(points):
+    """Area that points stand for together."""
+    return (points.reaches[:, 0, 3] / 255.0).sum() * points.area
+
+
 def across(mesh):
     """(T, 3) twice the area of each triangle, along its normal."""
     a, b, c = (mesh.positions[mesh.triangles[:, corner]].astype(np.float64) for corner in range(3))
@@ -80,8 +92,10 @@ def test_points_stand_for_all_of_the_surface(count, exponent, wanted, seed):
     mesh = any_soup(np.random.default_rng(seed), count, exponent)
     total = areas_of(mesh).sum()
     points = points_of(mesh, wanted / total)
-    assert points.count * points.area == pytest.approx(total, rel=1e-12)
-    assert wanted * (1.0 - 1e-12) <= points.count <= wanted * (1.0 + 1e-12) + 1.0
+    assert surface_of(points) == pytest.approx(total, rel=1e-12)
+    inside = points_inside(mesh, wanted / total).count
+    assert wanted * (1.0 - 1e-12) <= inside <= wanted * (1.0 + 1e-12) + 1.0
+    assert inside <= points.count <= 1.25 * inside
     assert (points.positions.dtype, points.positions.shape) == (np.float32, (points.count, 3))
     assert (points.normals.dtype, points.normals.shape) == (np.float32, (points.count, 3))
     assert (points.reaches.dtype, points.reaches.shape) == (np.uint8, (points.count, 2, 4))
@@ -111,7 +125,7 @@ def test_triangles_have_points_by_their_area_whatever_their_sizes(count, wanted,
     """Equal steps along the areas: of each triangle, and of all that lie together, less than one more or fewer."""
     mesh = any_soup(np.random.default_rng(seed), count)
     areas = areas_of(mesh)
-    points = points_of(mesh, wanted / areas.sum())
+    points = points_inside(mesh, wanted / areas.sum())
     triangle = owners(mesh, points)
     assert (np.diff(triangle) >= 0).all()
     found = np.concatenate([[0], np.cumsum(np.bincount(triangle, minlength=count))])
@@ -125,13 +139,33 @@ def test_triangles_have_points_by_their_area_whatever_their_sizes(count, wanted,
 def test_points_are_spread_over_a_triangle_more_evenly_than_by_chance(count):
     """In each of 16 equal parts of it as many as elsewhere, but for the standard deviation of independent points."""
     mesh = soup([(0.0, 0.0, 0.0), (3.0, 0.0, 0.0), (1.0, 2.0, 0.0)])
-    points = points_of(mesh, (count - 0.5) / 3.0)
+    points = points_inside(mesh, (count - 0.5) / 3.0)
     assert points.count == count
     inside, _ = places_in(mesh, points.positions, np.zeros(count, np.int64))
     parts = np.floor(4.0 * inside.clip(0.0, 1.0 - SINGLE)).astype(np.int64)
     _, counts = np.unique(parts, axis=0, return_counts=True)
     assert len(counts) == 16
     assert np.abs(counts - count / 16.0).max() <= sqrt(count * 15.0) / 16.0
+
+
+@pytest.mark.parametrize("box", [None, [[-0.5] * 3, [0.5] * 3]])
+def test_a_large_triangle_has_points_along_its_edges_and_none_where_it_is_cut(box):
+    """No farther apart than they reach both ways, after those inside."""
+    mesh, density = soup([(-0.4, -0.4, 0.0), (4.0, -0.4, 0.0), (-0.4, 4.0, 0.0)]), 4800.0
+    points = points_of(mesh, density, box)
+    added = points.positions[points_inside(mesh, density, box).count :]
+    inside, _ = places_in(mesh, added, np.zeros(len(added), np.int64))
+    assert (inside.min(axis=1) < 1e-6).all()
+    farthest = 2.0 * REACH * sqrt(points.area)
+    for axis in (0, 1):
+        along = np.sort(added[added[:, 1 - axis] < -0.4 + 1e-6, axis])
+        along = np.concatenate([[-0.4], along[along < 0.5], [0.5]])
+        assert np.diff(along).max() < farthest
+
+
+def test_a_small_triangle_has_no_points_along_its_edges():
+    mesh = soup([level_triangle(0.0)])
+    assert points_of(mesh, 100.0).count == points_inside(mesh, 100.0).count == 50
 
 
 def test_neighbouring_small_triangles_share_points_as_evenly_as_a_large_one_has_them():
@@ -154,7 +188,7 @@ def points_of_anything(triangles, density, box=None):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(grid_points, "MOST_POINTS", 500)
         points = points_of(mesh, density, box)
-    assert points.count <= 500
+    assert points.count <= 1.25 * 500
     assert np.isfinite(points.area)
     for array in (points.positions, points.normals, points.uvs, points.uv_scale, points.colors):
         assert len(array) == points.count
@@ -210,7 +244,7 @@ def test_only_the_slots_triangles_have_points():
 @pytest.mark.parametrize(("most", "count"), [(7, 7), (1000, 400)])
 def test_there_are_no_more_points_than_the_most_and_they_stand_for_more_then(monkeypatch, most, count):
     monkeypatch.setattr(grid_points, "MOST_POINTS", most)
-    points = points_of(builders.quad("quad"), 100.0)
+    points = points_inside(builders.quad("quad"), 100.0)
     assert points.count == count
     assert points.area == pytest.approx(4.0 / count)
 
@@ -271,7 +305,7 @@ def test_a_box_leaves_out_no_surface_in_it_and_what_is_beyond_half_its_side(coun
     least = sum(area_within(triangle, box) for triangle in corners)
     density = 4.0 / (half**2 * max(thinnest, 0.01))
     points = points_of(mesh, density, box)
-    kept = points.count * points.area
+    kept = surface_of(points)
     assert kept >= least * (1.0 - 1e-9)
     if thinnest > 0.01:
         near = box + half * np.array([[-1.0], [1.0]])
@@ -311,7 +345,7 @@ def test_in_a_box_points_of_a_large_triangle_are_as_even_as_everywhere(seed):
 @pytest.mark.parametrize("half", [1e3, 1e6, 1e9, 1e11])
 def test_surface_in_a_box_has_points_however_large_its_triangles_are(half):
     points = points_of(builders.quad("quad", half=half), 3.0, [[-1.0, -0.5, -1.0], [1.0, 1.5, 1.0]])
-    assert 4.0 <= points.count * points.area <= 16.0
+    assert 4.0 <= surface_of(points) <= 16.0
 
 
 def test_a_box_that_holds_all_or_nothing():
@@ -334,8 +368,8 @@ def test_reaches_end_at_the_box_around_the_triangle_or_where_the_next_points_are
         reaches = points.reaches[:, side, [0, 2]] * (farthest / 255.0)
         assert (reaches >= expected - 0.01 * farthest / 255.0).all()
         assert (reaches <= expected + farthest / 255.0).all()
-    assert not points.reaches[..., [1, 3]].any()
-    assert points.reaches.max() == 255
+    assert not points.reaches[..., 1].any()
+    assert points.reaches[..., :3].max() == 255
 
 
 def test_a_point_of_a_triangle_smaller_than_what_it_stands_for_reaches_half_way_to_the_next():
@@ -345,4 +379,4 @@ def test_a_point_of_a_triangle_smaller_than_what_it_stands_for_reaches_half_way_
     points = points_of(many, 0.99e5)
     assert points.count == 5
     assert (points.reaches[..., :2] == np.ceil(255.0 * 0.5 / REACH)).all()
-    assert not points.reaches[..., 2:].any()
+    assert not points.reaches[..., 2].any()

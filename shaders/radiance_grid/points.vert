@@ -13,8 +13,8 @@ uniform usampler2D face_sources; // not 0 where a face is kept from an earlier g
 in vec3 in_position;
 in vec3 in_normal;  // unit, of the triangle
 #ifndef OCCUPANCY
-in vec4 in_reach_low;   // how far the surface goes on from the point, each way along the object's axes,
-in vec4 in_reach_high;  // of REACH times point_spacing
+in vec4 in_reach_low;   // how far the surface goes on from the point, each way along the object's axes, of REACH times
+in vec4 in_reach_high;  // point_spacing; w: the share of point_area that the point stands for
 #endif
 #ifdef TEXTURE
 in vec2 in_uv;
@@ -64,10 +64,12 @@ void main()
     bool within = all(greaterThanEqual(cell, ivec3(0))) && all(lessThan(cell, size)) && scale > 0.0;
     normal = scaled / max(scale, 1e-30);
     offset = place - (vec3(cell) + 0.5);
-    area = point_area * scale;
     cell = clamp(cell, ivec3(0), size - 1);
     int orientation = orientation_of(normal);
-#ifndef OCCUPANCY
+#ifdef OCCUPANCY
+    area = point_area * scale;
+#else
+    area = point_area * in_reach_low.w * scale;
     for (int axis = 0; axis < 3; ++axis) {
         vec3 row = (axis == 0 ? in_row_0 : axis == 1 ? in_row_1 : in_row_2).xyz * (REACH * point_spacing / level_cell);
         low[axis] = offset[axis] - dot(max(row, 0.0), in_reach_low.xyz) + dot(min(row, 0.0), in_reach_high.xyz);

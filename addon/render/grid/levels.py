@@ -33,9 +33,10 @@ _STEP = (0.8191725133961645, 0.6710436067037893, 0.5497004779019703)
 _SNAP = 8
 """A level that does not cover the scene moves by so many of its cells at a time."""
 
-_STEPS_PER_OCTAVE = 4
+_STEPS_PER_OCTAVE = 16
 COARSER = 2.0 ** (1.0 / _STEPS_PER_OCTAVE)
-"""Cell sizes are rounded so, lest every movement of the camera be another grid."""
+"""Cell sizes are rounded so, lest every movement of the camera be another grid. From one to the next light changes by
+less than ½ %: an octave, from 64 to 128 cells, changes Cornell's by 1.7 % and Sponza's by 2 %."""
 
 BYTES_PER_CELL = 4
 """Of the table of cells; what is in them comes on top: `textures.bytes_per_face`."""
@@ -73,7 +74,7 @@ class GridLevel:
 def cell_size(seen: Float64Array, cells: int) -> float:
     """Side (m) of the finest cells, so that about `cells` of them are along the longest side of what is `seen` (2, 3).
 
-    Rounded to quarters of octaves.
+    Rounded up to steps of `COARSER`.
     """
     side = float((seen[1] - seen[0]).max())
     if not (side > 0.0 and np.isfinite(side)):

@@ -16,7 +16,13 @@ REACH = 1.5
 """Times the points' spacing: how far from each its surface is taken to go on, unless its triangle ends before."""
 
 MOST_POINTS = 1 << 22
-"""Points of one slot of one mesh at most; where that is too few, they are farther apart."""
+"""Points inside the triangles of one slot of one mesh at most; where that is too few, they are farther apart."""
+
+_MOST_ON_EDGES = 0.25
+"""Points along the edges of a triangle over those inside it at most: of smaller triangles edges have none."""
+
+_SHARE_ON_EDGES = 64
+"""Of the 255 that a point inside stands for: enough to close a strip, little beside what else a cell has."""
 
 _HALVINGS = 40
 """Triangles that are larger than a box by more than so many have no exact place in it."""
@@ -28,9 +34,9 @@ class SurfacePoints:
 
     `positions`, `normals` (N, 3) float32: normals of the triangles, unit. `uvs` (N, 2) float32, `colors` (N, 4) float32
     or None where the mesh has none. `uv_scale` (N,) float32: how much of the UV map a metre of the triangle covers.
-    `area` (m²): what each point stands for. `reaches` (N, 2, 4) uint8: how far the surface around a point goes on
-    towards −x, −y, −z and +x, +y, +z, 255 for `REACH` times the points' spacing; it ends at the box around its
-    triangle.
+    `area` (m²): what each point inside its triangle stands for. `reaches` (N, 2, 4) uint8: how far the surface around
+    a point goes on towards −x, −y, −z and +x, +y, +z, 255 for `REACH` times the points' spacing; it ends at the box
+    around its triangle; and, in both rows, the share of `area` that the point stands for, 255 for all of it.
     """
 
     positions: Float32Array
@@ -52,7 +58,8 @@ def surface_points(mesh: Mesh, slot: SlotRange, density: float, box: Float64Arra
 
     `box` (2, 3), object space: what of the surface is well outside may be left out; None for all of it.
     Points follow the triangles' areas at equal steps, and within them Roberts' R2 sequence, so that neighbouring small
-    triangles share points as evenly as a large one has them.
+    triangles share points as evenly as a large one has them. Large triangles have points along their edges, too: a cell
+    that no more than a strip of a wall is in would have none, and light would leave a closed room there.
     """
     triangles = mesh.triangles[slot.first : slot.first + slot.count]
     corners = mesh.positions[triangles].astype(np.float64)
@@ -70,7 +77,12 @@ def surface_points(mesh: Mesh, slot: SlotRange, density: float, box: Float64Arra
     numbers = np.arange(count)
     chosen = np.searchsorted(cumulative, (numbers + 0.5) * (cumulative[-1] / count), side="right")
     chosen = np.minimum(chosen, len(double) - 1)
-    weights = (_triangle_lattice(numbers)[:, :, None] * places[chosen]).sum(axis=1)
+    on_edges, edge_lattice = _on_edges(corners, places, 0.5 * double, count / total)
+    chosen = np.concatenate([chosen, on_edges])
+    lattice = np.concatenate([_triangle_lattice(numbers), edge_lattice])
+    weights = (lattice[:, :, None] * places[chosen]).sum(axis=1)
+    shares = np.concatenate([np.full(count, 255), np.full(len(on_edges), _SHARE_ON_EDGES)])
+    area = 255.0 * total / float(shares.sum())
     chosen_triangles = triangles[source[chosen]]
 
     def interpolated(values: Float32Array) -> Float32Array:
@@ -85,15 +97,18 @@ def surface_points(mesh: Mesh, slot: SlotRange, density: float, box: Float64Arra
         uvs,
         None if mesh.colors is None else interpolated(mesh.colors),
         _uv_scale(mesh, triangles, corners, source, places)[chosen],
-        _reaches(
-            positions, mesh.positions[chosen_triangles].astype(np.float64), normals, double[chosen], total / count
-        ),
-        total / count,
+        _reaches(positions, mesh.positions[chosen_triangles].astype(np.float64), normals, double[chosen], area, shares),
+        area,
     )
 
 
 def _reaches(
-    positions: Float32Array, corners: Float64Array, normals: Float64Array, double: Float64Array, area: float
+    positions: Float32Array,
+    corners: Float64Array,
+    normals: Float64Array,
+    double: Float64Array,
+    area: float,
+    shares: Int64Array,
 ) -> UInt8Array:
     """`SurfacePoints.reaches` of points in triangles (N, 3, 3) of twice these areas (N,)."""
     spacing = float(np.sqrt(area))
@@ -104,7 +119,9 @@ def _reaches(
     reaches = np.zeros((len(positions), 2, 4))
     for side, extent in enumerate((low, high)):
         reaches[:, side, :3] = np.clip(np.maximum(extent, least), 0.0, REACH * spacing * across)
-    return np.ceil(reaches * (255.0 / (REACH * spacing)) - 1e-3).clip(0, 255).astype(np.uint8)
+    steps = np.ceil(reaches * (255.0 / (REACH * spacing)) - 1e-3).clip(0, 255)
+    steps[..., 3] = shares[:, None]
+    return steps.astype(np.uint8)
 
 
 def _triangle_lattice(numbers: Int64Array) -> Float64Array:
@@ -112,6 +129,28 @@ def _triangle_lattice(numbers: Int64Array) -> Float64Array:
     u = np.modf(0.5 + numbers[:, None] * np.array([0.7548776662466927, 0.5698402909980532]))[0]
     root = np.sqrt(u[:, 0])
     return np.stack([1.0 - root, root * (1.0 - u[:, 1]), root * u[:, 1]], axis=1)
+
+
+def _on_edges(
+    corners: Float64Array, places: Float64Array, areas: Float64Array, density: float
+) -> tuple[Int64Array, Float64Array]:
+    """Triangle (E,) and barycentric coordinates (E, 3) of points along the edges of the large ones among triangles
+    (T, 3, 3) with `areas` (T,), `REACH` times the spacing of `density` points per unit of area apart.
+
+    `places` (T, 3, 3): barycentric coordinates of their corners in what they were cut from; cuts have no points.
+    """
+    whole = ((places == 0.0) & (np.roll(places, -1, axis=1) == 0.0)).any(axis=2)
+    lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2) * whole
+    counts = np.ceil(lengths * (np.sqrt(density) / REACH))
+    large = np.flatnonzero(counts.sum(axis=1) <= _MOST_ON_EDGES * areas * density)
+    of_edges = counts[large].astype(np.int64).ravel()
+    edges = np.repeat(np.arange(len(of_edges)), of_edges)
+    number = np.arange(len(edges)) - np.repeat(np.cumsum(of_edges) - of_edges, of_edges)
+    along = (number + 0.5) / of_edges[edges]
+    lattice = np.zeros((len(edges), 3))
+    lattice[np.arange(len(edges)), edges % 3] = 1.0 - along
+    lattice[np.arange(len(edges)), (edges + 1) % 3] = along
+    return large[edges // 3], lattice
 
 
 def _across(corners: Float64Array) -> Float64Array:
