@@ -76,7 +76,8 @@ def test_lights_beyond_what_adds_up(shared_session, method, strength):
     scene = lit_by_all(cornell(lamp))
     panel = rectangle("panel", (0, 0, 0.98), (0.4, 0, 0), (0, -0.4, 0))
     scene = beside(scene, (panel, glowing(emission=strength)))
-    shown(shared_session, scene, indirect=replace(SMALL, method=method))
+    picture = shown(shared_session, scene, indirect=replace(SMALL, method=method))
+    assert (picture.max() > 1e20) == (strength > 1.0)
 
 
 @every_method
@@ -280,10 +281,16 @@ def test_a_hundred_thousand_tiny_triangles(shared_session):
 
 
 @every_method
-@pytest.mark.parametrize("eye", [(0.3, 0.3, -0.6), (0.0, 1.0 - 1e-4, 0.0)], ids=["in a block", "at a wall"])
-def test_a_camera_where_none_should_be(shared_session, method, eye):
+@pytest.mark.parametrize(
+    ("eye", "sees_the_lamp"),
+    [((0.3, 0.3, -0.6), False), ((0.0, 1.0 - 1e-4, 0.0), True)],
+    ids=["in a block", "at a wall"],
+)
+def test_a_camera_where_none_should_be(shared_session, method, eye, sees_the_lamp):
+    """A block's inside has no more than all of the world's light, 0.3, reflected by half; the room has the lamp's."""
     camera = looking(eye, np.add(eye, (0.0, -1.0, 0.0)), half_width=1.0)
-    shown(shared_session, lit_by_all(cornell(LAMP)), camera, replace(SMALL, method=method), layers=2)
+    picture = shown(shared_session, lit_by_all(cornell(LAMP)), camera, replace(SMALL, method=method), layers=2)
+    assert (picture.max() > 0.5 * 0.3 * 1.001) == sees_the_lamp
 
 
 @every_method

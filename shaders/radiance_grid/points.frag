@@ -11,8 +11,8 @@ uniform sampler2D base_color_texture;
 
 flat in vec3 offset;
 flat in vec3 normal;
-flat in float area;
 #ifndef OCCUPANCY
+flat in float area;
 flat in vec3 low;
 flat in vec3 high;
 #endif

@@ -29,8 +29,8 @@ in vec2 in_glow;    // whether the front and the back of the instance send the l
 
 flat out vec3 offset;       // from the cell's centre, cells
 flat out vec3 normal;       // unit, world space
-flat out float area;        // m²
 #ifndef OCCUPANCY
+flat out float area;        // m²
 flat out vec3 low;          // box around the point's surface, from the cell's centre, cells
 flat out vec3 high;
 #endif
@@ -66,9 +66,7 @@ void main()
     offset = place - (vec3(cell) + 0.5);
     cell = clamp(cell, ivec3(0), size - 1);
     int orientation = orientation_of(normal);
-#ifdef OCCUPANCY
-    area = point_area * scale;
-#else
+#ifndef OCCUPANCY
     area = point_area * in_reach_low.w * scale;
     for (int axis = 0; axis < 3; ++axis) {
         vec3 row = (axis == 0 ? in_row_0 : axis == 1 ? in_row_1 : in_row_2).xyz * (REACH * point_spacing / level_cell);
